@@ -1,0 +1,5 @@
+//! The `littoral` command.
+
+fn main() {
+    println!("littoral");
+}

@@ -1,0 +1,23 @@
+//! Files in, rasters out: everything of Littoral that touches a disk.
+//!
+//! [`open`] looks at a file's content (never only at its name), and answers with a [`Source`]: what the file is
+//! ([`Info`]), which resolutions it holds, and windows of heights from it. [`load`] goes all the way to a
+//! [`littoral::field::Raster`] with a [`Georeference`], at a resolution that fits the memory asked for.
+//!
+//! Rules that hold for every reader:
+//!
+//! - A void is told from a height once, here: declared no-data, NaN and infinities, well-known sentinels, and heights
+//!   outside −12 000 … 9 000 m (see [`voids`]). Readers hand out `f32` metres with NaN for void.
+//! - Sizes are checked against the file's length before any allocation. A broken file gives an [`Error`] that says what
+//!   was expected, what was found and what to do, or a partial read with a [`Warning`](Info::warnings); never a panic.
+//! - Samples are points. Files that speak of areas are converted once, in [`Georeference`].
+
+mod error;
+pub mod formats;
+mod georeference;
+mod source;
+pub mod voids;
+
+pub use error::Error;
+pub use georeference::{Crs, Georeference, Registration};
+pub use source::{Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, open};

@@ -1,0 +1,90 @@
+//! What has a height: the [`HeightField`] trait and those who implement it.
+//!
+//! Everything downstream — meshes, rays, pictures — asks a height field two things about a square of surface: how low and
+//! high it reaches, and how wrong a coarse drawing of it would be.
+
+pub mod coast;
+mod land;
+pub mod noise;
+mod raster;
+
+pub use land::Land;
+pub use raster::{Raster, RasterError, VoidMask, Window};
+
+use crate::space::{Cell, Datum, Place};
+
+/// The lowest and the highest height of something (m). Empty when `low > high`: there is no surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightRange {
+    /// Nothing is lower (m).
+    pub low: f32,
+    /// Nothing is higher (m).
+    pub high: f32,
+}
+
+impl HeightRange {
+    /// The range of nothing: the neutral element of [`HeightRange::union`].
+    pub const EMPTY: HeightRange = HeightRange { low: f32::INFINITY, high: f32::NEG_INFINITY };
+
+    /// Whether there is no surface at all.
+    pub fn is_empty(self) -> bool {
+        self.low > self.high
+    }
+
+    /// The smallest range that holds both.
+    pub fn union(self, other: HeightRange) -> HeightRange {
+        HeightRange { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Whether `height` lies within.
+    pub fn contains(self, height: f32) -> bool {
+        self.low <= height && height <= self.high
+    }
+}
+
+/// Heights (m) above a datum. Land is one; the sea, frozen at an instant, is another.
+///
+/// A field is a continuous surface except where it is *void*: unknown or absent. Voids are never bridged.
+pub trait HeightField: Sync {
+    /// What the heights are counted from.
+    fn datum(&self) -> Datum;
+
+    /// The height at a place (m); `None` where the field is void.
+    fn height(&self, at: Place) -> Option<f32>;
+
+    /// Lowest and highest height in `cell`, its border included; empty where it is all void. May be loose, never tight:
+    /// culling and rays trust it.
+    fn range(&self, cell: Cell) -> HeightRange;
+
+    /// Greatest vertical distance (m) from the surface to `cell` drawn as two triangles over its corners, whichever
+    /// diagonal is taken. Never below its children's: the bound that every LOD rests on. Infinite for a cell that is
+    /// partly void, since no drawing of it is right; zero where there is no surface.
+    fn error(&self, cell: Cell) -> f32;
+
+    /// `side` × `side` heights over `cell`, its borders included, row by row from the south-west; NaN where void.
+    ///
+    /// # Panics
+    /// If `side < 2` or `heights` does not hold `side * side` numbers.
+    fn fill(&self, cell: Cell, side: usize, heights: &mut [f32]) {
+        assert!(side >= 2, "expected at least 2 samples a side, got {side}");
+        assert_eq!(heights.len(), side * side, "expected room for {side} × {side} heights");
+        let (corner, step) = (cell.low_corner(), cell.side() / (side - 1) as f64);
+        for (row, line) in heights.chunks_exact_mut(side).enumerate() {
+            for (column, height) in line.iter_mut().enumerate() {
+                let uv = corner.uv + glam::DVec2::new(column as f64, row as f64) * step;
+                *height = self.height(Place { uv, ..corner }).unwrap_or(f32::NAN);
+            }
+        }
+    }
+
+    /// Heights at many places at once; NaN where void. Overridden where bulk is faster.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    fn heights(&self, places: &[Place], heights: &mut [f32]) {
+        assert_eq!(places.len(), heights.len(), "expected as many heights as places");
+        for (place, height) in places.iter().zip(heights) {
+            *height = self.height(*place).unwrap_or(f32::NAN);
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Flight paths: points above ground or absolute, and the curves through them.
