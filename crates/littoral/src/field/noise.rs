@@ -12,6 +12,7 @@
 use super::{HeightField, HeightRange};
 use crate::space::{Cell, Datum, Place};
 use glam::DVec2;
+use std::f64::consts::FRAC_PI_4;
 
 /// A value and its gradient at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,7 +60,7 @@ fn lattice_gradient(x: i64, y: i64, seed: u32) -> DVec2 {
     // A point of the circle without trigonometry, so that every platform agrees: rational parametrisation by quarters.
     let t = (h >> 34) as f64 / (1u64 << 30) as f64 * 2.0 - 1.0;
     // Equal steps of t bunch up angles by at most 2:1; a cubic evens them out to a few per cent.
-    let t = t * (0.785_398_163_397_448_3 + 0.214_601_836_602_551_7 * t * t);
+    let t = t * (FRAC_PI_4 + (1.0 - FRAC_PI_4) * t * t);
     let (c, s) = ((1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t));
     match h & 1 {
         0 => DVec2::new(c, s),
