@@ -6,6 +6,16 @@
 
 mod walk;
 
+mod profile;
+mod section;
+mod sight;
+mod slope;
+mod viewshed;
+
+pub use profile::{ProfilePoint, ProfilePoints, ProfileSummary};
+pub use sight::{Curvature, GRAZE, Obstacle, Sight, SightError, Station};
+pub use viewshed::{Viewshed, ViewshedCount};
+
 use crate::field::Land;
 use crate::space::Ray;
 use glam::{DVec2, DVec3, Vec3};
