@@ -4,9 +4,10 @@
 //! face of the land's datum is the raster padded to 2ᵏ × 2ᵏ patches, so that cells of level k are exactly the patches and
 //! every cell's corners lie on samples; the padding is void and never shows.
 
-use super::{HeightField, HeightRange, Raster, Window};
+use super::{ErrorPyramid, HeightField, HeightRange, Raster, Window};
 use crate::space::{Cell, Datum, Place};
 use glam::{DVec2, DVec3, Vec3};
+use std::sync::OnceLock;
 
 /// Ground known by samples: a raster placed in the world.
 #[derive(Clone, Debug)]
@@ -15,6 +16,8 @@ pub struct Land {
     origin: DVec2,
     /// The quadtree level at which cells are patches between four neighbouring samples.
     finest: u8,
+    /// Built when first asked for: pictures and queries never need it.
+    errors: OnceLock<ErrorPyramid>,
 }
 
 impl Land {
@@ -28,7 +31,7 @@ impl Land {
     pub fn at(raster: Raster, origin: DVec2) -> Land {
         let patches = (raster.columns().max(raster.rows()) - 1).next_power_of_two();
         let finest = patches.trailing_zeros() as u8;
-        Land { raster, origin, finest }
+        Land { raster, origin, finest, errors: OnceLock::new() }
     }
 
     /// The samples.
@@ -105,6 +108,9 @@ impl Land {
     /// If the window leaves the raster or the number of heights is not its size.
     pub fn edit(&mut self, window: Window, heights: &[f32]) {
         self.raster.replace(window, heights);
+        if let Some(errors) = self.errors.get_mut() {
+            errors.update(&self.raster, window);
+        }
     }
 }
 
@@ -122,7 +128,7 @@ impl HeightField for Land {
         self.raster.range()
     }
 
-    fn error(&self, _cell: Cell) -> f32 {
-        f32::INFINITY
+    fn error(&self, cell: Cell) -> f32 {
+        self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest)).error(&self.raster, cell)
     }
 }

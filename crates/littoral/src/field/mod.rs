@@ -4,10 +4,12 @@
 //! high it reaches, and how wrong a coarse drawing of it would be.
 
 pub mod coast;
+mod deviation;
 mod land;
 pub mod noise;
 mod raster;
 
+pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use raster::{Raster, RasterError, VoidMask, Window};
 
