@@ -4,7 +4,14 @@
 //! ray hits it from above and from below alike, at the first point of the sheet at a distance in [0, reach]; a ray that
 //! starts on the sheet hits it at 0. Through holes and under the sheet's edges rays pass.
 
+mod bulk;
+mod lanes;
+mod scene;
+mod stream;
 mod walk;
+
+pub use bulk::{RayCaster, Simd};
+pub use stream::LocalRay;
 
 use crate::field::Land;
 use crate::space::Ray;
