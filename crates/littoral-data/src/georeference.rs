@@ -259,16 +259,6 @@ impl Georeference {
         let (low, high) = (corners.iter().copied().reduce(DVec2::min), corners.iter().copied().reduce(DVec2::max));
         let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
         match &self.crs {
-            Crs::Unknown if !self.y_south => {
-                let degrees = low.x >= -180.5 && high.x <= 360.5 && low.y >= -90.5 && high.y <= 90.5;
-                if degrees && (high - low).max_element() <= 0.2 * self.size[0].max(self.size[1]) as f64 {
-                    warnings.push(
-                        "no coordinate system is stated and the coordinates look like degrees, but are taken as metres; \
-                         `gdal_translate -a_srs EPSG:4326 in out` says so in the file"
-                            .into(),
-                    );
-                }
-            }
             Crs::Geographic { .. } => {
                 let extent = (high - low).max_element();
                 if extent > 5.0 {

@@ -169,8 +169,9 @@ fn crs(keys: &HashMap<u16, Value>, warnings: &mut Vec<String>) -> Crs {
     if projected.is_some() || model == Some(1) {
         let definition = definition(keys);
         let name = text(3073).or(text(1026)).unwrap_or_else(|| "user-defined projection".into());
-        let name =
-            if name.starts_with("ESRI PE String = ") { Crs::from_wkt(&name[17..]).name().to_owned() } else { name };
+        if let Some(wkt) = name.strip_prefix("ESRI PE String = ") {
+            return Crs::from_wkt(wkt);
+        }
         return Crs::Projected { name, metres: unit.unwrap_or(1.0), definition };
     }
     if let Some(code) = code(2048) {

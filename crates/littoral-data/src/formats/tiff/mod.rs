@@ -20,7 +20,7 @@ mod image;
 mod samples;
 mod source;
 
-use crate::bytes::Bytes;
+use crate::formats::Input;
 use crate::{Error, Source};
 use std::path::Path;
 
@@ -34,14 +34,13 @@ pub fn sniff(start: &[u8]) -> bool {
 /// # Errors
 /// If the file cannot be read, is no TIFF, or holds no height samples that can be decoded.
 pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
-    let bytes = Bytes::open(file).map_err(|error| Error::io(file, error))?;
-    Ok(Box::new(source::TiffSource::open(file, bytes, true)?))
+    open_input(Input::file(file)?)
 }
 
-/// Opens a GeoTIFF that is in memory already; `file` only names it in errors.
+/// Opens a GeoTIFF on disk or in memory.
 ///
 /// # Errors
 /// As [`open`].
-pub fn open_bytes(file: &Path, bytes: Vec<u8>) -> Result<Box<dyn Source>, Error> {
-    Ok(Box::new(source::TiffSource::open(file, Bytes::Memory(bytes), false)?))
+pub fn open_input(input: Input) -> Result<Box<dyn Source>, Error> {
+    Ok(Box::new(source::TiffSource::open(input)?))
 }

@@ -8,6 +8,7 @@ use super::image::{Compression, Image, tag};
 use super::samples::SampleKind;
 use crate::bytes::Bytes;
 use crate::crs::{US_SURVEY_FOOT, metres_of_unit_name};
+use crate::formats::Input;
 use crate::voids::VoidRule;
 use crate::{Crs, Error, Georeference, Info, Level, Source};
 use littoral::field::Window;
@@ -43,10 +44,18 @@ pub(super) struct TiffSource {
 }
 
 impl TiffSource {
-    /// Opens the file; with `beside`, also its companions on disk.
-    pub(super) fn open(path: &Path, bytes: Bytes, beside: bool) -> Result<TiffSource, Error> {
-        let error = |problem: String| Error::content(path, problem);
-        let file = Container::new(bytes).map_err(error)?;
+    /// Opens the file and its companions.
+    pub(super) fn open(input: Input) -> Result<TiffSource, Error> {
+        let path = input.name.clone();
+        let error = |problem: String| Error::content(&path, problem);
+        let sidecar = |names: &[&str]| {
+            let content = names.iter().find_map(|name| input.sidecar(name))?;
+            Some(String::from_utf8_lossy(&content).into_owned())
+        };
+        let world = sidecar(&["tfw", "tifw", "tiffw", "wld"]);
+        let projection = sidecar(&["prj"]);
+        let outside = input.sidecar_path("ovr");
+        let file = Container::new(input.into_bytes()).map_err(error)?;
         let (directories, chain_warning) = file.directories().map_err(error)?;
         let mut warnings: Vec<String> = chain_warning.into_iter().collect();
 
@@ -81,14 +90,16 @@ impl TiffSource {
             warnings.push("the map is in feet, but the unit of the heights is not stated; metres are taken".into());
         }
 
-        let beside_transform = || {
-            let text = beside.then(|| world_file(path)).flatten()?;
-            Georeference::geotransform_of_world_file(&text)
-        };
         let mut georeference = Georeference::none(image.columns, image.rows);
         georeference.registration = placement.registration;
         georeference.crs = placement.crs;
-        if let Some(geotransform) = placement.geotransform.or_else(beside_transform) {
+        if georeference.crs == Crs::Unknown
+            && let Some(text) = projection
+        {
+            georeference.crs = Crs::from_wkt(&text);
+        }
+        if let Some(geotransform) = placement.geotransform.or_else(|| Georeference::geotransform_of_world_file(&world?))
+        {
             georeference.y_south = false;
             georeference.geotransform = geotransform;
         }
@@ -117,7 +128,7 @@ impl TiffSource {
             }
         }
         let mut containers = vec![file];
-        if beside && let Some(outside) = overviews_beside(path, &mut warnings) {
+        if let Some(outside) = outside.and_then(|file| overviews_beside(&file, &mut warnings)) {
             let (found, _) = outside.directories().unwrap_or_default();
             images.extend(found.iter().filter_map(|directory| Some((1, Image::new(&outside, directory).ok()?))));
             containers.push(outside);
@@ -125,7 +136,7 @@ impl TiffSource {
         keep_overviews(&mut images);
         let levels: Vec<Level> =
             images.iter().map(|(_, image)| Level { columns: image.columns, rows: image.rows }).collect();
-        let info = Info {
+        let mut info = Info {
             format: "GTiff",
             columns: levels[0].columns,
             rows: levels[0].rows,
@@ -136,8 +147,9 @@ impl TiffSource {
             step,
             warnings,
         };
+        crate::formats::assume_degrees(&mut info);
         Ok(TiffSource {
-            path: path.to_owned(),
+            path,
             containers,
             images,
             levels,
@@ -318,23 +330,9 @@ fn keep_overviews(images: &mut Vec<(usize, Image)>) {
     });
 }
 
-/// The text of a world file beside a TIFF: `.tfw`, `.tifw`, `.tiffw`, `.wld`, in small or large letters.
-fn world_file(path: &Path) -> Option<String> {
-    let names = ["tfw", "tifw", "tiffw", "wld"];
-    let name = names.iter().flat_map(|name| [name.to_string(), name.to_uppercase()]);
-    let file = name.map(|name| path.with_extension(name)).find(|file| file.is_file())?;
-    // Six numbers; whatever is longer is something else.
-    let bytes = Bytes::open(&file).ok().filter(|bytes| bytes.length() < 4096)?;
-    String::from_utf8(bytes.exact(0, bytes.length())?).ok()
-}
-
-/// The TIFF of overviews beside a file: `name.tif.ovr`, or `name.ovr`.
-fn overviews_beside(path: &Path, warnings: &mut Vec<String>) -> Option<Container> {
-    let mut full = path.as_os_str().to_owned();
-    full.push(".ovr");
-    let file =
-        [PathBuf::from(full), path.with_extension("ovr")].into_iter().find(|file| file.is_file() && file != path)?;
-    match Bytes::open(&file).map_err(|error| error.to_string()).and_then(Container::new) {
+/// A TIFF of overviews beside a file.
+fn overviews_beside(file: &Path, warnings: &mut Vec<String>) -> Option<Container> {
+    match Bytes::open(file).map_err(|error| error.to_string()).and_then(Container::new) {
         Ok(container) => Some(container),
         Err(problem) => {
             warnings.push(format!("the overviews in {} are left out: {problem}", file.display()));
