@@ -50,6 +50,21 @@ impl Default for Display {
 }
 
 impl Picture {
+    /// A black picture of sky alone.
+    pub(super) fn empty(size: UVec2, eye: DVec3) -> Picture {
+        let pixels = size.x as usize * size.y as usize;
+        Picture {
+            size,
+            eye,
+            radiance: vec![[0.0; 3]; pixels],
+            depth: vec![f32::INFINITY; pixels],
+            normal: vec![[0.0; 3]; pixels],
+            position: vec![[f32::INFINITY; 3]; pixels],
+            height: vec![f32::NAN; pixels],
+            coverage: vec![0.0; pixels],
+        }
+    }
+
     /// The radiance that an automatic exposure shows as middle grey (kcd/m²).
     pub fn grey(&self) -> f32 {
         let mut sum = 0.0f64;
