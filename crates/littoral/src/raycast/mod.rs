@@ -1,5 +1,15 @@
 //! What a ray meets first: hits, shadows, lines of sight and viewsheds against the exact surface.
 
+mod profile;
+mod section;
+mod sight;
+mod slope;
+mod viewshed;
+
+pub use profile::{ProfilePoint, ProfilePoints, ProfileSummary};
+pub use sight::{Curvature, GRAZE, Obstacle, Sight, SightError, Station};
+pub use viewshed::{Viewshed, ViewshedCount};
+
 use crate::field::Land;
 use crate::space::Ray;
 use glam::{DVec3, Vec3};
