@@ -1,5 +1,7 @@
 //! One file per format; none knows another.
 
+pub mod tiff;
+
 use crate::{Error, Source};
 use std::path::Path;
 
