@@ -16,8 +16,10 @@ mod crs;
 mod error;
 pub mod formats;
 mod georeference;
+pub mod path;
 mod source;
 pub mod voids;
+pub mod write;
 
 pub use crs::Crs;
 pub use error::Error;
