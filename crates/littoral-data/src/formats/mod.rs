@@ -1,11 +1,128 @@
 //! One file per format; none knows another.
+//!
+//! [`open`] looks at the first bytes, and asks each format in turn whether they are its own. Formats without a mark of
+//! their own (`.hgt`, raw samples) are known by their length, their name or the header beside them.
 
+pub mod ascii_grid;
+pub mod hgt;
+mod input;
+pub mod png;
+pub mod raw;
+pub mod text;
 pub mod tiff;
+pub mod tiles;
 
-use crate::{Error, Source};
+pub use input::Input;
+
+use crate::{Crs, Error, Georeference, Info, Source, VerticalDatum};
+use littoral::field::Raster;
 use std::path::Path;
 
+/// How much of a file is looked at to tell its format.
+const HEAD: usize = 4096;
+
 /// Finds the reader for a file by its first bytes.
-pub(crate) fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
-    Err(Error::content(file, "expected a height file of a known format"))
+///
+/// # Errors
+/// If the file cannot be read, is of no known format, or is broken.
+pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
+    open_input(Input::file(file)?)
+}
+
+/// Finds the reader for opened bytes.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_input(mut input: Input) -> Result<Box<dyn Source>, Error> {
+    let head = input.head(HEAD)?;
+    if head.is_empty() {
+        return Err(input.error("expected a height file, got an empty file"));
+    }
+    if png::sniff(&head) {
+        return png::open(input);
+    }
+    if text::is_text(&head) && ascii_grid::sniff(&head) {
+        return ascii_grid::open(input);
+    }
+    if hgt::sniff(&input) {
+        return hgt::open(input);
+    }
+    let shown: String = head.iter().take(8).map(|b| format!("{b:02x} ")).collect();
+    Err(input.error(format!("expected a height file of a known format, got one that begins with {shown:?}")))
+}
+
+/// What a header says, before anything of it is known but the size.
+pub(crate) fn info(format: &'static str, columns: usize, rows: usize) -> Info {
+    Info {
+        format,
+        columns,
+        rows,
+        nodata: None,
+        georeference: Georeference::none(columns, rows),
+        vertical_metres: 1.0,
+        vertical_datum: VerticalDatum::Unknown,
+        step: 0.0,
+        warnings: Vec::new(),
+    }
+}
+
+/// `columns` × `rows`, if a raster may have such sides and the file can hold `most` samples.
+pub(crate) fn check_fits(input: &Input, columns: usize, rows: usize, most: u64) -> Result<usize, Error> {
+    check_size_fits(&input.name, input.length(), columns, rows, most)
+}
+
+/// As [`check_fits`], where the input is lent to a decoder.
+pub(crate) fn check_size_fits(
+    name: &Path,
+    length: u64,
+    columns: usize,
+    rows: usize,
+    most: u64,
+) -> Result<usize, Error> {
+    let side = 1..=Raster::MAX_SIDE;
+    let samples = columns.checked_mul(rows).filter(|_| side.contains(&columns) && side.contains(&rows));
+    samples.filter(|&n| n as u64 <= most).ok_or_else(|| {
+        let problem = format!(
+            "expected a size that {length} bytes can hold and at most {} samples a side, got {columns} × {rows}; the header \
+             is broken or the file cut off",
+            Raster::MAX_SIDE
+        );
+        Error::content(name, problem)
+    })
+}
+
+/// The coordinate system of the `.prj` beside a file.
+pub(crate) fn crs_from_sidecar(input: &Input) -> Crs {
+    input.sidecar_text("prj").map_or(Crs::Unknown, |text| crs_from_wkt(&text))
+}
+
+/// What a world file of one of these extensions and a `.prj` beside the file say.
+pub(crate) fn georeference_beside(input: &Input, columns: usize, rows: usize, extensions: &[&str]) -> Georeference {
+    let _ = extensions;
+    Georeference { crs: crs_from_sidecar(input), ..Georeference::none(columns, rows) }
+}
+
+/// A coordinate system from well-known text.
+pub(crate) fn crs_from_wkt(text: &str) -> Crs {
+    let _ = text;
+    Crs::Unknown
+}
+
+/// Files that name no coordinate system, but whose coordinates can only be degrees: a cell under half a unit, all within
+/// ±180 (or 0 … 360) and ±90, and not simply counted from zero. Read as metres they would be a spike of infinite height.
+pub(crate) fn assume_degrees(info: &mut Info) {
+    let g = info.georeference.geotransform;
+    let [columns, rows] = [info.columns as f64, info.rows as f64];
+    let x = [g[0], g[0] + g[1] * columns];
+    let y = [g[3], g[3] + g[5] * rows];
+    let small = g[2] == 0.0 && g[4] == 0.0 && g[1].abs() < 0.5 && g[5].abs() < 0.5;
+    let on_earth = x.iter().all(|x| (-181.0..=361.0).contains(x)) && y.iter().all(|y| (-91.0..=91.0).contains(y));
+    let counted = x.contains(&0.0) && y.contains(&0.0);
+    if info.georeference.crs == Crs::Unknown && small && on_earth && !counted {
+        info.georeference.crs = Crs::Geographic { name: "degrees, assumed to be WGS 84".into() };
+        info.warnings.push(
+            "no coordinate system is stated, but the coordinates look like degrees: taken as longitude and latitude"
+                .into(),
+        );
+    }
 }
