@@ -89,7 +89,8 @@ impl Opened {
             }
         }
         let spacing = self.frame.spacing();
-        let raster = Raster::new(window.columns, window.rows, spacing, heights).map_err(|e| self.failure(&e.to_string()))?;
+        let raster =
+            Raster::new(window.columns, window.rows, spacing, heights).map_err(|e| self.failure(&e.to_string()))?;
         let first_row = if self.frame.north_first { window.row + window.rows - 1 } else { window.row };
         let corner = DVec2::new(window.column as f64, first_row as f64);
         Ok(Land::at(raster, self.frame.local_from_sample.transform_point2(corner)))
@@ -162,7 +163,8 @@ impl Frame {
         };
         let spacing = DVec2::new((x * scale).length(), (y * scale).length());
         // A file without a place of its own shows its first row in the north, as pictures do.
-        let north_first = x.perp_dot(y) < 0.0 || georeference.crs == Crs::Unknown && georeference.geotransform[5] == 1.0;
+        let north_first =
+            x.perp_dot(y) < 0.0 || georeference.crs == Crs::Unknown && georeference.geotransform[5] == 1.0;
         let step = if north_first { DVec2::new(spacing.x, -spacing.y) } else { spacing };
         let local_from_sample = DAffine2::from_scale_angle_translation(step, 0.0, -0.5 * last * step);
         Frame { local_from_sample, crs_from_sample, crs: georeference.crs.clone(), last, north_first }
@@ -192,7 +194,9 @@ impl Frame {
     /// Local metres of coordinates.
     pub fn local_from(&self, system: System, at: DVec2) -> Result<DVec2, String> {
         if system == System::LonLat && !matches!(self.crs, Crs::Geographic { .. }) {
-            return Err("expected a file in degrees for --lonlat, got one in another system; give its own coordinates".into());
+            return Err(
+                "expected a file in degrees for --lonlat, got one in another system; give its own coordinates".into()
+            );
         }
         let sample = self.crs_from_sample.inverse();
         let mut at = sample.transform_point2(at);
@@ -242,6 +246,11 @@ impl Frame {
         &self.crs
     }
 
+    /// The latitude of the middle (degrees), where known.
+    pub fn latitude(&self) -> Option<f64> {
+        matches!(self.crs, Crs::Geographic { .. }).then(|| self.crs_from_sample.transform_point2(0.5 * self.last).y)
+    }
+
     /// The angle from the land's y axis clockwise to north (rad).
     pub fn north(&self) -> f64 {
         let north = (self.local_from_sample * self.crs_from_sample.inverse()).transform_vector2(DVec2::Y);
@@ -263,12 +272,8 @@ pub fn height_at(land: &Land, local: DVec2) -> Option<f32> {
     }
     let base = lattice.floor();
     let (f, column, row) = (lattice - base, base.x as usize, base.y as usize);
-    let corners = [
-        (0, 0, (1.0 - f.x) * (1.0 - f.y)),
-        (1, 0, f.x * (1.0 - f.y)),
-        (0, 1, (1.0 - f.x) * f.y),
-        (1, 1, f.x * f.y),
-    ];
+    let corners =
+        [(0, 0, (1.0 - f.x) * (1.0 - f.y)), (1, 0, f.x * (1.0 - f.y)), (0, 1, (1.0 - f.x) * f.y), (1, 1, f.x * f.y)];
     let mut height = 0.0;
     for (i, j, weight) in corners {
         if weight > 0.0 {

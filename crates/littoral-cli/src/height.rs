@@ -154,11 +154,13 @@ impl Height {
             let lines: Vec<&[u8]> = block.strip_suffix(b"\n").unwrap_or(&block).split(|&b| b == b'\n').collect();
             type Looked = Result<Option<(DVec2, DVec2, Found)>, String>;
             let look = |(number, line): (usize, &&[u8])| -> Looked {
-                let text = std::str::from_utf8(line).map_err(|_| at_line(&name, lines_before + number, "binary data"))?;
+                let text =
+                    std::str::from_utf8(line).map_err(|_| at_line(&name, lines_before + number, "binary data"))?;
                 let Some(xy) = point(text).map_err(|got| at_line(&name, lines_before + number, got))? else {
                     return Ok(None);
                 };
-                let local = opened.frame.local_from(system, xy).map_err(|e| format!("{}: {e}", opened.file.display()))?;
+                let local =
+                    opened.frame.local_from(system, xy).map_err(|e| format!("{}: {e}", opened.file.display()))?;
                 Ok(Some((xy, local, self.find(&land, local))))
             };
             let looked: Vec<Looked> = lines.par_iter().enumerate().with_min_len(256).map(look).collect();
@@ -219,7 +221,10 @@ fn fill(reader: &mut impl BufRead, block: &mut Vec<u8>) -> std::io::Result<usize
 /// The point in a line; `None` for blank lines, comments and a header.
 fn point(line: &str) -> Result<Option<DVec2>, &str> {
     let line = line.trim();
-    if line.is_empty() || line.starts_with('#') || line.starts_with(|c: char| c.is_alphabetic()) && !line.starts_with(['n', 'N', 'i', 'I']) {
+    if line.is_empty()
+        || line.starts_with('#')
+        || line.starts_with(|c: char| c.is_alphabetic()) && !line.starts_with(['n', 'N', 'i', 'I'])
+    {
         return Ok(None);
     }
     let mut parts = line.split([',', ';', ' ', '\t']).filter(|part| !part.is_empty());

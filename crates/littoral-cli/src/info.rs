@@ -95,7 +95,11 @@ impl Info {
             },
             overviews: opened.levels().iter().skip(1).map(|level| [level.columns, level.rows]).collect(),
         };
-        if talk.json() { talk.print_json(answer) } else { talk.print(table(&self.file.display().to_string(), &answer, &opened)) }
+        if talk.json() {
+            talk.print_json(answer)
+        } else {
+            talk.print(table(&self.file.display().to_string(), &answer, &opened))
+        }
     }
 }
 
@@ -146,8 +150,13 @@ fn horizontal_unit(crs: &Crs) -> String {
 
 /// The name of a unit of so many metres.
 fn unit(metres: f64) -> String {
-    const NAMES: [(f64, &str); 5] =
-        [(1.0, "metre"), (0.3048, "foot"), (1200.0 / 3937.0, "US survey foot"), (1000.0, "kilometre"), (0.01, "centimetre")];
+    const NAMES: [(f64, &str); 5] = [
+        (1.0, "metre"),
+        (0.3048, "foot"),
+        (1200.0 / 3937.0, "US survey foot"),
+        (1000.0, "kilometre"),
+        (0.01, "centimetre"),
+    ];
     let named = NAMES.iter().find(|(m, _)| (m - metres).abs() < 1e-9 * m);
     named.map_or_else(|| format!("{metres} metres"), |(_, name)| (*name).to_owned())
 }
@@ -172,39 +181,57 @@ fn table(file: &str, answer: &Answer, opened: &Opened) -> String {
     let [x, y] = answer.cell_m;
     line("cell", format!("{} × {} m", tidy(x, 3), tidy(y, 3)));
     line("extent", format!("{} × {}", kilometres(answer.width, x), kilometres(answer.height, y)));
-    line("heights", match (answer.min, answer.max) {
-        (Some(low), Some(high)) => format!("{low} to {high} m"),
-        _ => "none".to_owned(),
-    });
-    line("step", match answer.step_m {
-        0.0 => "floating point".to_owned(),
-        step => format!("{} m between heights that the file can tell apart", tidy(step, 4)),
-    });
+    line(
+        "heights",
+        match (answer.min, answer.max) {
+            (Some(low), Some(high)) => format!("{low} to {high} m"),
+            _ => "none".to_owned(),
+        },
+    );
+    line(
+        "step",
+        match answer.step_m {
+            0.0 => "floating point".to_owned(),
+            step => format!("{} m between heights that the file can tell apart", tidy(step, 4)),
+        },
+    );
     let share = 100.0 * answer.void as f64 / samples.max(1) as f64;
-    line("void", match (answer.void, answer.nodata) {
-        (0, None) => "none".to_owned(),
-        (0, Some(nodata)) => format!("none (no-data value {nodata})"),
-        (void, None) => format!("{void} samples ({} %), no no-data value declared", tidy(share, 2)),
-        (void, Some(nodata)) => format!("{void} samples ({} %), no-data value {nodata}", tidy(share, 2)),
-    });
+    line(
+        "void",
+        match (answer.void, answer.nodata) {
+            (0, None) => "none".to_owned(),
+            (0, Some(nodata)) => format!("none (no-data value {nodata})"),
+            (void, None) => format!("{void} samples ({} %), no no-data value declared", tidy(share, 2)),
+            (void, Some(nodata)) => format!("{void} samples ({} %), no-data value {nodata}", tidy(share, 2)),
+        },
+    );
     line("first", height(answer.first));
     line("centre", height(answer.centre));
     line("last", height(answer.last));
-    line("system", answer.crs.map_or("not stated: coordinates taken as metres".to_owned(), |name| {
-        format!("{name}, in units of a {}", answer.horizontal_unit)
-    }));
+    line(
+        "system",
+        answer.crs.map_or("not stated: coordinates taken as metres".to_owned(), |name| {
+            format!("{name}, in units of a {}", answer.horizontal_unit)
+        }),
+    );
     let (low, high) = opened.frame.bounds();
     let shown = |c: f64| opened.frame.shown(c);
     line("X", format!("{} to {}", shown(low.x), shown(high.x)));
     line("Y", format!("{} to {}", shown(low.y), shown(high.y)));
     line("pixels are", format!("{}s", answer.point_or_area));
-    line("unit", match answer.vertical_unit.as_str() {
-        "metre" => "metre".to_owned(),
-        unit => format!("{unit}; all heights here are converted to metres"),
-    });
-    line("datum", match answer.vertical_datum {
-        Some(name) => name.to_owned(),
-        None => "not stated: height 0 taken as sea level".to_owned(),
-    });
+    line(
+        "unit",
+        match answer.vertical_unit.as_str() {
+            "metre" => "metre".to_owned(),
+            unit => format!("{unit}; all heights here are converted to metres"),
+        },
+    );
+    line(
+        "datum",
+        match answer.vertical_datum {
+            Some(name) => name.to_owned(),
+            None => "not stated: height 0 taken as sea level".to_owned(),
+        },
+    );
     text
 }

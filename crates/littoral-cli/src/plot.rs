@@ -36,7 +36,9 @@ impl Plot {
         if kind == "svg" {
             return Ok(write::whole(file, |sink| sink.write_all(svg.as_bytes()))?);
         }
-        let failed = |what: String| Failure::Work(format!("{}: expected to draw a plot, got \"{what}\"; use .svg", file.display()));
+        let failed = |what: String| {
+            Failure::Work(format!("{}: expected to draw a plot, got \"{what}\"; use .svg", file.display()))
+        };
         let mut fonts = usvg::fontdb::Database::new();
         fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
         fonts.set_sans_serif_family("Ubuntu");

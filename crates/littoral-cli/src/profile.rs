@@ -70,7 +70,9 @@ impl Profile {
         let local = |xy| opened.frame.local_from(system, xy).map_err(|e| opened.failure(&e));
         let (from, to) = (local(self.from)?, local(self.to)?);
         if from == to {
-            return Err(Failure::Usage("expected two different ends of a profile, got the same twice; change one".into()));
+            return Err(Failure::Usage(
+                "expected two different ends of a profile, got the same twice; change one".into(),
+            ));
         }
         let window = opened.window_of([from, to]);
         let land = opened.part(window)?;
@@ -106,7 +108,8 @@ impl Profile {
             }
             (Some(out), Some(kind)) => {
                 let title = format!("{}: {} to {}", self.file.display(), shown(self.from), shown(self.to));
-                let plot = Plot { title, size: self.size, points: points.iter().map(|p| (p.distance, p.height)).collect() };
+                let plot =
+                    Plot { title, size: self.size, points: points.iter().map(|p| (p.distance, p.height)).collect() };
                 plot.write(out, kind)?;
             }
             _ => {}

@@ -96,7 +96,8 @@ impl Viewshed {
         for row in 0..window.rows {
             let line = if opened.frame.north_first() { window.rows - 1 - row } else { row };
             let into = (window.row + row) * columns + window.column;
-            grid[into..into + window.columns].copy_from_slice(&seen[line * window.columns..(line + 1) * window.columns]);
+            grid[into..into + window.columns]
+                .copy_from_slice(&seen[line * window.columns..(line + 1) * window.columns]);
         }
         let void = raster.voids().count();
         let note = format!(
