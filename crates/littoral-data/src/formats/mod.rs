@@ -38,6 +38,9 @@ pub fn open_input(mut input: Input) -> Result<Box<dyn Source>, Error> {
     if head.is_empty() {
         return Err(input.error("expected a height file, got an empty file"));
     }
+    if tiff::sniff(&head) {
+        return tiff::open_input(input);
+    }
     if png::sniff(&head) {
         return png::open(input);
     }

@@ -52,7 +52,10 @@ impl<'a> Stage<'a> {
             depth: seen.iter().map(|s| s.1).collect(),
             normal: seen.iter().map(|s| s.2.to_array()).collect(),
             position: seen.iter().map(|s| (s.3 * s.1).to_array()).collect(),
-            height: seen.iter().map(|s| if s.1.is_finite() { view.eye.z as f32 + s.3.z * s.1 } else { f32::NAN }).collect(),
+            height: seen
+                .iter()
+                .map(|s| if s.1.is_finite() { view.eye.z as f32 + s.3.z * s.1 } else { f32::NAN })
+                .collect(),
             coverage: seen.iter().map(|s| f32::from(u8::from(s.1.is_finite()))).collect(),
         }
     }
