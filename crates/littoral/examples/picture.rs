@@ -35,7 +35,7 @@ fn main() -> Result<(), Failure> {
     let size = numbers("size").map_or(UVec2::new(1280, 720), |s| UVec2::new(s[0] as u32, s[1] as u32));
     let mut shot = match options.contains_key("raw") {
         true => compose(&land, water.as_ref(), size),
-        false => coast_shot(&land, water.as_ref(), size),
+        false => coast_shot(size),
     };
     eprintln!("shot {:?}: eye {:.0}", started.elapsed(), shot.view.eye);
     if let (Some(eye), Some(look)) = (numbers("eye"), numbers("look")) {

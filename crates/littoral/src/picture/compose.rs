@@ -1,7 +1,7 @@
 //! A good view of any land, chosen by itself.
 
 use super::{Air, Style, Sun, Water};
-use crate::field::Land;
+use crate::field::{Land, coast};
 use crate::space::View;
 use glam::{DVec2, UVec2};
 
@@ -34,6 +34,12 @@ pub fn compose(land: &Land, _water: Option<&Water>, size: UVec2) -> Shot {
 }
 
 /// The picture of the [built-in coast](crate::field::coast).
-pub fn coast_shot(land: &Land, water: Option<&Water>, size: UVec2) -> Shot {
-    compose(land, water, size)
+pub fn coast_shot(size: UVec2) -> Shot {
+    let (azimuth, elevation) = coast::sun();
+    Shot {
+        view: coast::view(size),
+        sun: Sun::new(azimuth, elevation),
+        air: Air { visibility: 24_000.0, ..Air::default() },
+        style: Style::Natural,
+    }
 }

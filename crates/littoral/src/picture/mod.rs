@@ -14,10 +14,20 @@
 //!
 //! The same scene, view and settings give the same bits, however many threads work.
 
+mod atmosphere;
 mod compose;
 mod display;
+mod grain;
+mod ground;
+mod natural;
+mod sampler;
+mod sea;
+mod shade;
+mod skylight;
+mod spectrum;
 mod stage;
 mod texture;
+mod trace;
 mod water;
 
 pub use compose::{Shot, coast_shot, compose};
