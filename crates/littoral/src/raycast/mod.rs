@@ -4,17 +4,14 @@
 //! ray hits it from above and from below alike, at the first point of the sheet at a distance in [0, reach]; a ray that
 //! starts on the sheet hits it at 0. Through holes and under the sheet's edges rays pass.
 
+mod bulk;
+mod lanes;
+mod scene;
+mod stream;
 mod walk;
 
-mod profile;
-mod section;
-mod sight;
-mod slope;
-mod viewshed;
-
-pub use profile::{ProfilePoint, ProfilePoints, ProfileSummary};
-pub use sight::{Curvature, GRAZE, Obstacle, Sight, SightError, Station};
-pub use viewshed::{Viewshed, ViewshedCount};
+pub use bulk::{RayCaster, Simd};
+pub use stream::LocalRay;
 
 use crate::field::Land;
 use crate::space::Ray;
