@@ -17,10 +17,12 @@ mod crs;
 mod error;
 pub mod formats;
 mod georeference;
+pub mod path;
 mod reduce;
 mod source;
 mod survey;
 pub mod voids;
+pub mod write;
 
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};
 pub use error::Error;
