@@ -5,6 +5,7 @@
 //! starts on the sheet hits it at 0. Through holes and under the sheet's edges rays pass.
 
 mod bulk;
+mod camera;
 mod lanes;
 mod scene;
 mod stream;
