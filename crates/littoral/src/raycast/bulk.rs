@@ -56,10 +56,10 @@ impl Simd {
 /// the anchor plus half a millimetre, measured along the steeper of ray and surface. Put the anchor near where rays start.
 #[derive(Clone, Debug)]
 pub struct RayCaster<'a> {
-    land: &'a Land,
-    anchor: DVec3,
-    scene: Option<Scene<'a>>,
-    simd: Simd,
+    pub(super) land: &'a Land,
+    pub(super) anchor: DVec3,
+    pub(super) scene: Option<Scene<'a>>,
+    pub(super) simd: Simd,
 }
 
 impl Land {
@@ -215,7 +215,7 @@ impl<'a> RayCaster<'a> {
     }
 
     /// One ray by the `f64` walk.
-    fn exact(&self, ray: &LocalRay) -> f32 {
+    pub(super) fn exact(&self, ray: &LocalRay) -> f32 {
         let (origin, direction) = (self.anchor + ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let ray = Ray { origin, direction, reach: f64::from(ray.reach) };
         walk::first_crossing(self.land, &ray, true).map_or(f32::INFINITY, |crossing| crossing.distance as f32)
@@ -223,7 +223,7 @@ impl<'a> RayCaster<'a> {
 }
 
 /// Rays that a thread takes at a time.
-const PART: usize = 1 << 14;
+pub(super) const PART: usize = 1 << 14;
 
 /// A slice of rays, or some of it in some order.
 struct Stream<'a, T> {
@@ -261,9 +261,11 @@ impl<T: Copy> Rays for Stream<'_, T> {
                     number[lane] = from;
                 }
             }
-            let [ox, oy, oz, dx, dy, dz, reach] = numbers.map(|number| l.load(&number));
-            let (zero, top) = (l.splat(0.0), l.int(scene.top));
-            block.set(l, scene, at, l.load_int(&id), [ox, oy, oz], [dx, dy, dz], reach, zero, top);
+            let origin = [l.load(&numbers[0]), l.load(&numbers[1]), l.load(&numbers[2])];
+            let direction = [l.load(&numbers[3]), l.load(&numbers[4]), l.load(&numbers[5])];
+            let reach = l.load(&numbers[6]);
+            let (zero, top) = (l.splat(0.0), l.int(scene.top.min(scene.tune[4])));
+            block.set(l, scene, at, l.load_int(&id), origin, direction, reach, zero, top);
         }
         self.next += block.count;
     }

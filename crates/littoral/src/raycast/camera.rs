@@ -11,7 +11,7 @@
 
 use super::lanes::Lanes;
 use super::scene::Scene;
-use super::stream::{BLOCK, Prepared, Rays};
+use super::stream::{BLOCK, Prepared, Rays, absolute};
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
@@ -23,6 +23,10 @@ const FINE_IN_TILE: usize = ((TILE / FINE) * (TILE / FINE)) as usize;
 
 /// The id of a ray beyond the picture's edge: no index of a slice.
 const NOWHERE: i32 = -1;
+
+/// The pixels of a fine beam.
+const PIXEL_X: [i32; 16] = [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3];
+const PIXEL_Y: [i32; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3];
 
 /// The rays of some rows of a picture, tile by tile.
 pub(super) struct ViewRays<'a> {
@@ -141,16 +145,16 @@ impl<'a> ViewRays<'a> {
             let x = l.splat(self.eye.x * scene.per_metre.x + scene.offset.x);
             let y = l.splat(self.eye.y * scene.per_metre.y + scene.offset.y);
             let z = l.splat(self.eye.z + scene.height);
-            let [x_low, x_high] = [0, 1].map(|side| l.load(&beams.x[side][at..]));
-            let [y_low, y_high] = [0, 1].map(|side| l.load(&beams.y[side][at..]));
+            let (x_low, x_high) = (l.load(&beams.x[0][at..]), l.load(&beams.x[1][at..]));
+            let (y_low, y_high) = (l.load(&beams.y[0][at..]), l.load(&beams.y[1][at..]));
             let z_low = l.load(&beams.z[at..]);
             let mut t = l.load(&beams.t[at..]);
             let mut level = l.load_int(&beams.level[at..]);
             let zero = l.splat(0.0);
-            let absolute = |v: L::F| l.max(v, l.sub(zero, v));
-            let more = |a: L::F, b: L::F| l.max(absolute(a), absolute(b));
             // Cells per unit of distance along the beam and across it.
-            let along = l.max(l.max(more(x_low, x_high), more(y_low, y_high)), l.splat(1e-9));
+            let along_x = l.max(absolute(l, x_low), absolute(l, x_high));
+            let along_y = l.max(absolute(l, y_low), absolute(l, y_high));
+            let along = l.max(l.max(along_x, along_y), l.splat(1e-9));
             let across = l.max(l.sub(x_high, x_low), l.sub(y_high, y_low));
             let pace = l.div(l.splat(1.0), along);
             // Beyond this every ray of the beam has left the map, or the heights above it.
@@ -158,7 +162,7 @@ impl<'a> ViewRays<'a> {
             let out = l.div(l.splat(scene.high - self.eye.z - scene.height), l.select(rises, z_low, l.splat(1.0)));
             let across_map = l.mul(l.splat(self.diagonal(scene)), pace);
             let end = l.min(l.select(rises, l.max(out, zero), l.splat(f32::INFINITY)), l.add(across_map, across_map));
-            let (one, hair) = (l.int(1), l.splat(0.01));
+            let one = l.int(1);
             let mut active = l.lt(t, end);
             let (mut steps, most) = (0, 200);
             while l.bits(active) != 0 && steps < most {
@@ -166,29 +170,23 @@ impl<'a> ViewRays<'a> {
                 // Bars of 2^level cells; with the width of the beam their footprint still fits 2 × 2 nodes of this level + 1.
                 let cells = l.float(l.shl(one, level));
                 let next = l.add(t, l.mul(cells, pace));
-                let span = |low: L::F, high: L::F, at: L::F| {
-                    let a = l.min(l.mul(low, t), l.mul(low, next));
-                    let b = l.max(l.mul(high, t), l.mul(high, next));
-                    (l.floor(l.sub(l.add(a, at), hair)), l.floor(l.add(l.add(b, at), hair)))
-                };
-                let ((x0, x1), (y0, y1)) = (span(x_low, x_high, x), span(y_low, y_high, y));
+                let ((x0, x1), (y0, y1)) =
+                    (span(l, [x_low, x_high], x, t, next), span(l, [y_low, y_high], y, t, next));
                 let lowest = l.add(z, l.min(l.mul(z_low, t), l.mul(z_low, next)));
                 let coarser = l.imin(l.iadd(level, one), l.int(scene.top));
-                let node = |cell: L::I, axis: usize| {
-                    let cell = l.iadd(cell, l.int(scene.cell[axis]));
-                    l.shr(l.imax(l.imin(cell, l.int(scene.cells[axis] - 1)), l.int(0)), coarser)
-                };
-                let (x0, x1, y0, y1) = (node(x0, 0), node(x1, 0), node(y0, 1), node(y1, 1));
+                let (x0, x1) = (node(l, scene, 0, x0, coarser), node(l, scene, 0, x1, coarser));
+                let (y0, y1) = (node(l, scene, 1, y0, coarser), node(l, scene, 1, y1, coarser));
                 // Wider than two nodes: too wide for this level (the beam fans out, or the bar is steep).
                 let fits = l.and(l.igt(l.int(2), l.isub(x1, x0)), l.igt(l.int(2), l.isub(y1, y0)));
                 let (offset, stride) = (l.lookup(&scene.offsets, coarser), l.lookup(&scene.strides, coarser));
                 let (south, north) = (l.iadd(offset, l.imul(y0, stride)), l.iadd(offset, l.imul(y1, stride)));
                 // SAFETY: nodes are clamped to the raster's, at levels 1 to the top.
-                let highs = unsafe {
-                    [l.iadd(south, x0), l.iadd(south, x1), l.iadd(north, x0), l.iadd(north, x1)]
-                        .map(|index| l.gather_u16(scene.highs, index))
+                let (south_high, north_high) = unsafe {
+                    let west = (l.gather_u16(scene.highs, l.iadd(south, x0)), l.gather_u16(scene.highs, l.iadd(north, x0)));
+                    let east = (l.gather_u16(scene.highs, l.iadd(south, x1)), l.gather_u16(scene.highs, l.iadd(north, x1)));
+                    (l.imax(west.0, east.0), l.imax(west.1, east.1))
                 };
-                let high = l.imax(l.imax(highs[0], highs[1]), l.imax(highs[2], highs[3]));
+                let high = l.imax(south_high, north_high);
                 let high = l.add(l.mul(l.float(high), l.splat(scene.step)), l.splat(scene.high_base));
                 let clear = l.and(l.and(active, fits), l.lt(l.add(high, l.splat(0.01)), lowest));
                 t = l.select(clear, next, t);
@@ -217,6 +215,23 @@ impl<'a> ViewRays<'a> {
     }
 }
 
+/// The first and last cell along an axis that a beam touches between distances `from` and `to`: `bounds` of its direction,
+/// `at` its origin.
+#[inline(always)]
+fn span<L: Lanes>(l: L, bounds: [L::F; 2], at: L::F, from: L::F, to: L::F) -> (L::I, L::I) {
+    let hair = l.splat(0.01);
+    let low = l.min(l.mul(bounds[0], from), l.mul(bounds[0], to));
+    let high = l.max(l.mul(bounds[1], from), l.mul(bounds[1], to));
+    (l.floor(l.sub(l.add(low, at), hair)), l.floor(l.add(l.add(high, at), hair)))
+}
+
+/// The node of a level, along an axis, over a cell counted from the anchor's; the nearest one for cells beside the map.
+#[inline(always)]
+fn node<L: Lanes>(l: L, scene: &Scene, axis: usize, cell: L::I, level: L::I) -> L::I {
+    let cell = l.iadd(cell, l.int(scene.cell[axis]));
+    l.shr(l.imax(l.imin(cell, l.int(scene.cells[axis] - 1)), l.int(0)), level)
+}
+
 impl Rays for ViewRays<'_> {
     #[inline(always)]
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
@@ -236,28 +251,25 @@ impl Rays for ViewRays<'_> {
             if x + gx >= self.width || y + gy >= self.rows.end {
                 continue;
             }
-            let (mut id, mut px, mut py, mut from, mut level) =
-                ([0; BLOCK], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK], [0; BLOCK]);
-            for ray in 0..BLOCK {
-                // Four fine beams, each with its pixels row by row.
-                let (beam, pixel) = (ray as u32 / 16, ray as u32 % 16);
-                let (bx, by) = (gx + beam % 2 * FINE, gy + beam / 2 * FINE);
-                let (ix, iy) = (x + bx + pixel % 4, y + by + pixel / 4);
-                let fine = (by / FINE * 16 + bx / FINE) as usize;
-                let inside = ix < self.width && iy < self.rows.end;
-                id[ray] = if inside { ((iy - self.rows.start) * self.width + ix) as i32 } else { NOWHERE };
-                (px[ray], py[ray]) = (ix as f32 + self.sample.x, iy as f32 + self.sample.y);
-                (from[ray], level[ray]) = (self.starts[fine], self.levels[fine]);
-            }
-            let origin = self.eye.to_array().map(|v| l.splat(v));
+            let origin = [l.splat(self.eye.x), l.splat(self.eye.y), l.splat(self.eye.z)];
             for at in (0..BLOCK).step_by(L::COUNT) {
-                let (px, py) = (l.load(&px[at..]), l.load(&py[at..]));
-                let direction = [0, 1, 2].map(|axis| {
+                // Four fine beams, each with its pixels row by row.
+                let beam = at as u32 / 16;
+                let (bx, by) = (gx + beam % 2 * FINE, gy + beam / 2 * FINE);
+                let fine = (by / FINE * 16 + bx / FINE) as usize;
+                let ix = l.iadd(l.load_int(&PIXEL_X[at % 16..]), l.int((x + bx) as i32));
+                let iy = l.iadd(l.load_int(&PIXEL_Y[at % 16..]), l.int((y + by) as i32));
+                let inside = l.and(l.igt(l.int(self.width as i32), ix), l.igt(l.int(self.rows.end as i32), iy));
+                let id = l.iadd(l.imul(l.isub(iy, l.int(self.rows.start as i32)), l.int(self.width as i32)), ix);
+                let id = l.iselect(inside, id, l.int(NOWHERE));
+                let (px, py) = (l.add(l.float(ix), l.splat(self.sample.x)), l.add(l.float(iy), l.splat(self.sample.y)));
+                let mut direction = [px; 3];
+                for (axis, direction) in direction.iter_mut().enumerate() {
                     let across = l.add(l.splat(self.corner[axis]), l.mul(l.splat(self.right[axis]), px));
-                    l.add(across, l.mul(l.splat(self.down[axis]), py))
-                });
-                let (from, level) = (l.load(&from[at..]), l.load_int(&level[at..]));
-                block.set(l, scene, at, l.load_int(&id[at..]), origin, direction, l.splat(f32::INFINITY), from, level);
+                    *direction = l.add(across, l.mul(l.splat(self.down[axis]), py));
+                }
+                let (from, level) = (l.splat(self.starts[fine]), l.int((self.levels[fine] + scene.tune[5]).max(1)));
+                block.set(l, scene, at, id, origin, direction, l.splat(f32::INFINITY), from, level);
             }
             block.count = BLOCK;
             return;

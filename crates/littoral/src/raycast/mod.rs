@@ -6,8 +6,10 @@
 
 mod bulk;
 mod camera;
+mod heights;
 mod lanes;
 mod scene;
+mod segments;
 mod stream;
 mod walk;
 
