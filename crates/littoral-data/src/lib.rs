@@ -21,6 +21,7 @@ mod reduce;
 mod source;
 mod survey;
 pub mod voids;
+mod wkt;
 
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};
 pub use error::Error;
