@@ -266,9 +266,9 @@ mod tests {
             r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],AUTHORITY["EPSG","4326"]]"#;
         assert_eq!(Crs::from_wkt(geographic), Crs::Geographic { name: "EPSG:4326".into() });
         assert_eq!(Crs::from_wkt(geographic).unit(), "degree");
-        let (datum, metres) = crate::wkt::vertical(NETHERLANDS).expect("it has one");
+        let (datum, metres) = crate::VerticalDatum::from_wkt(NETHERLANDS).expect("it has one");
         assert_eq!((datum, metres), (crate::VerticalDatum::Named("EPSG:5709 (NAP height)".into()), 1.0));
-        assert_eq!(crate::wkt::vertical(WASHINGTON_OGC), None);
+        assert_eq!(crate::VerticalDatum::from_wkt(WASHINGTON_OGC), None);
         for (code, metres) in [(26710, 1.0), (2263, US_SURVEY_FOOT), (2222, 0.3048)] {
             let Some(Crs::Projected { metres: got, .. }) = Crs::from_epsg(code) else { panic!("{code}") };
             assert!((got - metres).abs() < 1e-12);
@@ -281,7 +281,7 @@ mod tests {
     #[test]
     fn broken_texts_are_unknown() {
         for cut in 0..NETHERLANDS.len() {
-            let _ = (Crs::from_wkt(&NETHERLANDS[..cut]), crate::wkt::vertical(&NETHERLANDS[..cut]));
+            let _ = (Crs::from_wkt(&NETHERLANDS[..cut]), crate::VerticalDatum::from_wkt(&NETHERLANDS[..cut]));
         }
         let deep = "PROJCS[".repeat(100_000);
         for text in ["", "[", "PROJCS", "PROJCS[", "PROJCS[\"", "PROJCS[]", "a[b[c", &deep, "GEOGCS[\u{e9}\u{e9}"] {

@@ -9,6 +9,8 @@ use crate::voids::VoidRule;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub(super) enum SampleKind {
+    /// One bit, eight to a byte, the highest first: masks alone.
+    Bit,
     U8,
     I8,
     U16,
@@ -23,10 +25,10 @@ pub(super) enum SampleKind {
 }
 
 impl SampleKind {
-    /// Bytes of one sample.
+    /// Bytes of one sample; of eight for bits.
     pub(super) fn size(self) -> usize {
         match self {
-            SampleKind::U8 | SampleKind::I8 => 1,
+            SampleKind::Bit | SampleKind::U8 | SampleKind::I8 => 1,
             SampleKind::U16 | SampleKind::I16 | SampleKind::F16 => 2,
             SampleKind::U32 | SampleKind::I32 | SampleKind::F32 => 4,
             SampleKind::U64 | SampleKind::I64 | SampleKind::F64 => 8,
@@ -173,6 +175,11 @@ pub(super) fn heights_of_row(row: &[u8], kind: SampleKind, stride: usize, rule: 
         }
     }
     match kind {
+        SampleKind::Bit => {
+            for (at, height) in heights.iter_mut().enumerate() {
+                *height = row.get(at / 8).map_or(f32::NAN, |byte| f32::from(byte >> (7 - at % 8) & 1));
+            }
+        }
         SampleKind::U8 => each(row, stride, rule, heights, |b: [u8; 1]| b[0].into()),
         SampleKind::I8 => each(row, stride, rule, heights, |b| i8::from_ne_bytes(b).into()),
         SampleKind::U16 => each(row, stride, rule, heights, |b| u16::from_ne_bytes(b).into()),
