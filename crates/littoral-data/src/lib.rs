@@ -23,6 +23,7 @@ mod source;
 mod survey;
 pub mod voids;
 pub mod write;
+mod wkt;
 
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};
 pub use error::Error;
