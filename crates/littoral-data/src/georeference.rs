@@ -1,5 +1,6 @@
 //! Where a file's samples lie: in its own coordinate system, in degrees, and in the engine's local metres.
 
+use crate::Crs;
 use glam::{DAffine2, DMat2, DVec2};
 
 /// Whether a file's samples stand for areas (pixel centres) or for points.
@@ -9,25 +10,6 @@ pub enum Registration {
     Area,
     /// Samples are points.
     Point,
-}
-
-/// The coordinate system of a file.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Crs {
-    /// Not stated.
-    Unknown,
-    /// Longitude and latitude in degrees.
-    Geographic {
-        /// What the file calls it, such as `EPSG:4326`.
-        name: String,
-    },
-    /// Eastings and northings.
-    Projected {
-        /// What the file calls it, such as `EPSG:32610`.
-        name: String,
-        /// Metres in one unit of its coordinates.
-        metres: f64,
-    },
 }
 
 /// From samples to coordinates to local metres.
@@ -60,5 +42,15 @@ impl Georeference {
         let g = self.geotransform;
         let linear = DMat2::from_cols(DVec2::new(g[1], g[4]), DVec2::new(g[2], g[5]));
         DAffine2::from_mat2_translation(linear, DVec2::new(g[0], g[3]) + linear * DVec2::splat(0.5))
+    }
+
+    /// The six numbers of a world file's text (`.tfw`, `.wld` …), which speaks of pixel centres, as a geotransform of
+    /// corners; `None` if the text is not six finite numbers that span an area.
+    pub fn geotransform_of_world_file(text: &str) -> Option<[f64; 6]> {
+        let mut numbers = text.split_whitespace().map(|word| word.replace(',', ".").parse::<f64>());
+        let mut next = || numbers.next()?.ok().filter(|n| n.is_finite());
+        // The order is A D B E C F: x steps first, then y, then the middle of the first pixel.
+        let [a, d, b, e, c, f] = [next()?, next()?, next()?, next()?, next()?, next()?];
+        (a * e - b * d != 0.0).then_some([c - 0.5 * (a + b), a, b, f - 0.5 * (d + e), d, e])
     }
 }

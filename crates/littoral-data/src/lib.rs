@@ -12,12 +12,14 @@
 //!   was expected, what was found and what to do, or a partial read with a [`Warning`](Info::warnings); never a panic.
 //! - Samples are points. Files that speak of areas are converted once, in [`Georeference`].
 
+mod crs;
 mod error;
 pub mod formats;
 mod georeference;
 mod source;
 pub mod voids;
 
+pub use crs::Crs;
 pub use error::Error;
-pub use georeference::{Crs, Georeference, Registration};
+pub use georeference::{Georeference, Registration};
 pub use source::{Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, open};

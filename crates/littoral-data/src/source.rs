@@ -46,12 +46,18 @@ pub struct Level {
 }
 
 /// An opened file.
-pub trait Source {
+pub trait Source: Send {
     /// What the file is. Warnings may grow as more of the file is read.
     fn info(&self) -> &Info;
 
     /// The resolutions held, the full one first, then ever coarser ones.
     fn levels(&self) -> &[Level];
+
+    /// Columns and rows of the blocks in which a level is stored, counted from its first sample: windows along their
+    /// borders read cheapest. A whole row unless a format says otherwise.
+    fn block(&self, level: usize) -> [usize; 2] {
+        [self.levels()[level].columns, 1]
+    }
 
     /// Heights (m) of a window of one level, in the file's order (first row first); NaN where void.
     ///
