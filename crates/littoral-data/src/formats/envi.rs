@@ -7,7 +7,7 @@ use super::raw::{Layout, RawSource, SampleType, check_size};
 use super::text::number;
 use super::{Input, assume_degrees, crs_from_sidecar, info, metres_of_unit};
 use crate::voids::VoidRule;
-use crate::{Crs, Error, Georeference, Info, Registration, Source};
+use crate::{Crs, Error, Info, Source};
 use std::collections::HashMap;
 
 /// Data files that such a header may belong to, the likely ones first; also one without any extension.
@@ -100,10 +100,10 @@ fn place(info: &mut Info, input: &Input, map_info: Option<&str>, wkt: Option<&st
         crs => crs,
     };
     let crs = if crs == Crs::Unknown { crs_from_sidecar(input) } else { crs };
-    let Georeference { size, geotransform, .. } = Georeference::none(info.columns, info.rows);
-    info.georeference = Georeference { geotransform, registration: Registration::Area, crs, size };
+    info.georeference.crs = crs;
     match numbers[..] {
         [px, py, x, y, dx, dy] if dx > 0.0 && dy > 0.0 => {
+            info.georeference.y_south = false;
             info.georeference.geotransform = [x - (px - 1.0) * dx, dx, 0.0, y + (py - 1.0) * dy, 0.0, -dy];
             if let Some(turn) = words.iter().find_map(|w| w.strip_prefix("rotation=")).and_then(number)
                 && turn.is_finite()

@@ -109,6 +109,7 @@ pub fn open(input: Input, header: &str) -> Result<Box<dyn Source>, Error> {
         registration: Registration::Area,
         crs: crs_from_sidecar(&input),
         size: [columns as usize, rows as usize],
+        y_south: false,
     };
     assume_degrees(&mut info);
     if bands > 1 {

@@ -55,6 +55,14 @@ impl Input {
         self
     }
 
+    /// The bytes alone, to be read at any place by many threads.
+    pub(crate) fn into_bytes(self) -> crate::bytes::Bytes {
+        match self.bytes {
+            Bytes::Disk(file) => crate::bytes::Bytes::File(file, self.length),
+            Bytes::Memory(bytes) => crate::bytes::Bytes::Memory(bytes.into_inner()),
+        }
+    }
+
     /// Length in bytes.
     pub fn length(&self) -> u64 {
         self.length
@@ -113,15 +121,6 @@ impl Input {
         Ok(BufReader::with_capacity(1 << 16, self))
     }
 
-    /// Name and bytes, if they are in memory; the input itself if they are not.
-    #[allow(clippy::result_large_err)]
-    pub(crate) fn in_memory(self) -> Result<(PathBuf, Vec<u8>), Input> {
-        match self.bytes {
-            Bytes::Memory(cursor) => Ok((self.name, cursor.into_inner())),
-            Bytes::Disk(_) => Err(self),
-        }
-    }
-
     /// The bytes as the NetCDF reader wants them: ranges of a file, or memory.
     pub(crate) fn into_storage(self) -> Result<netcdf_reader::DynStorage, Error> {
         Ok(match self.bytes {
@@ -139,6 +138,14 @@ impl Input {
         if let Some((_, content)) = self.beside.iter().find(|(name, _)| name == extension) {
             return Some(content.clone());
         }
+        let path = self.sidecar_path(extension)?;
+        let mut content = Vec::new();
+        File::open(path).ok()?.take(LONGEST_SIDECAR + 1).read_to_end(&mut content).ok()?;
+        (content.len() as u64 <= LONGEST_SIDECAR).then_some(content)
+    }
+
+    /// Where the companion of this extension lies on disk, if there is one.
+    pub fn sidecar_path(&self, extension: &str) -> Option<PathBuf> {
         let Bytes::Disk(_) = self.bytes else { return None };
         let mut paths = [extension.to_owned(), extension.to_uppercase()].into_iter().flat_map(|extension| {
             let mut appended = OsString::from(&self.name);
@@ -146,10 +153,7 @@ impl Input {
             appended.push(&extension);
             [self.name.with_extension(&extension), PathBuf::from(appended)]
         });
-        let path = paths.find(|path| *path != self.name && path.is_file())?;
-        let mut content = Vec::new();
-        File::open(path).ok()?.take(LONGEST_SIDECAR + 1).read_to_end(&mut content).ok()?;
-        (content.len() as u64 <= LONGEST_SIDECAR).then_some(content)
+        paths.find(|path| *path != self.name && path.is_file())
     }
 
     /// The companion of this extension as text.

@@ -60,10 +60,7 @@ fn open_unpacked(mut input: Input) -> Result<Box<dyn Source>, Error> {
     }
     // Formats with a mark of their own.
     if tiff::sniff(&head) {
-        return match input.in_memory() {
-            Ok((name, bytes)) => tiff::open_bytes(&name, bytes),
-            Err(input) => tiff::open(&input.name),
-        };
+        return tiff::open_input(input);
     }
     type Sniffer = fn(&[u8]) -> bool;
     type Opener = fn(Input) -> Result<Box<dyn Source>, Error>;
@@ -219,6 +216,7 @@ pub(crate) fn georeference_beside(input: &Input, columns: usize, rows: usize, ex
     let mut georeference = Georeference { crs: crs_from_sidecar(input), ..Georeference::none(columns, rows) };
     if let Some(geotransform) = world.and_then(|text| Georeference::geotransform_of_world_file(&text)) {
         georeference.geotransform = geotransform;
+        georeference.y_south = false;
     }
     georeference
 }

@@ -148,6 +148,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
         registration: if pixels { Registration::Area } else { Registration::Point },
         crs: crs(variables, variable, leading).unwrap_or(sidecar),
         size: [columns, rows],
+        y_south: false,
     };
     assume_degrees(&mut info);
 

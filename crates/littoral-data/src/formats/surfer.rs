@@ -50,6 +50,7 @@ fn place_stepwise(input: &Input, info: &mut Info, low: [f64; 2], [dx, dy]: [f64;
         registration: Registration::Point,
         crs: crs_from_sidecar(input),
         size: [info.columns, info.rows],
+        y_south: false,
     };
     info.nodata = Some(BLANK);
     assume_degrees(info);

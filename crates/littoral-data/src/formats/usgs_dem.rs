@@ -111,6 +111,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
         registration: Registration::Point,
         crs: crs(system, whole(&record, 162).unwrap_or(0), horizontal, if ground_unit == 1 { FOOT } else { 1.0 }),
         size: [profiles, rows],
+        y_south: false,
     };
     Ok(Box::new(MemorySource::new(info, heights)))
 }

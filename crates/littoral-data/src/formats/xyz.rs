@@ -168,6 +168,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
         registration: Registration::Point,
         crs: crs_from_sidecar(&input),
         size: [columns, rows],
+        y_south: false,
     };
     assume_degrees(&mut info);
     info.step = if whole { 1.0 } else { 0.0 };
