@@ -5,9 +5,9 @@
 
 use super::raw::{Layout, RawSource, SampleType, check_size};
 use super::text::number;
-use super::{Input, assume_degrees, crs_from_sidecar, info, metres_of_unit};
+use super::{Input, assume_degrees, crs_from_sidecar, info};
 use crate::voids::VoidRule;
-use crate::{Crs, Error, Info, Source};
+use crate::{Crs, Error, Info, Source, metres_of_unit_name};
 use std::collections::HashMap;
 
 /// Data files that such a header may belong to, the likely ones first; also one without any extension.
@@ -131,7 +131,7 @@ fn crs_of_words(words: &[&str]) -> Crs {
         }
         // Feet would otherwise be taken for metres.
         Some(_) => {
-            let unit = words.iter().find_map(|w| w.to_lowercase().strip_prefix("units=").and_then(metres_of_unit));
+            let unit = words.iter().find_map(|w| w.to_lowercase().strip_prefix("units=").and_then(metres_of_unit_name));
             unit.filter(|m| *m != 1.0).map_or(Crs::Unknown, |metres| Crs::Projected {
                 name: format!("ENVI {}", words[0]),
                 metres,

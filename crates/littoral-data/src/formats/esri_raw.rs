@@ -123,7 +123,8 @@ pub fn open(input: Input, header: &str) -> Result<Box<dyn Source>, Error> {
     // Old ARC/INFO projections have a line such as `Zunits  FEET`; newer headers may.
     let projection = input.sidecar_text("prj").unwrap_or_default().to_lowercase();
     let old_units = projection.lines().find_map(|line| line.trim().strip_prefix("zunits").map(|u| u.trim().to_owned()));
-    if let Some(metres) = text("zunits").map(str::to_owned).or(old_units).and_then(|unit| super::metres_of_unit(&unit))
+    if let Some(metres) =
+        text("zunits").map(str::to_owned).or(old_units).and_then(|unit| crate::metres_of_unit_name(&unit))
     {
         info.vertical_metres = metres;
         info.step *= metres;

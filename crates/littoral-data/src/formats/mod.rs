@@ -150,21 +150,6 @@ fn samples_beside(input: &Input, head: &[u8]) -> Result<Option<Input>, Error> {
     }
 }
 
-/// Metres in a unit of height, by the names that files use.
-pub(crate) fn metres_of_unit(name: &str) -> Option<f64> {
-    match name.trim().to_lowercase().as_str() {
-        "m" | "metre" | "metres" | "meter" | "meters" | "m." => Some(1.0),
-        "ft" | "foot" | "feet" | "international foot" => Some(0.3048),
-        "us-ft" | "us_ft" | "us survey foot" | "us survey feet" | "us_survey_foot" => Some(1200.0 / 3937.0),
-        "km" | "kilometre" | "kilometres" | "kilometer" | "kilometers" => Some(1000.0),
-        "cm" | "centimetre" | "centimetres" | "centimeter" | "centimeters" => Some(0.01),
-        "dm" | "decimetre" | "decimeter" | "decimeters" => Some(0.1),
-        "mm" | "millimetre" | "millimeter" | "millimeters" => Some(0.001),
-        "fathom" | "fathoms" => Some(1.8288),
-        _ => None,
-    }
-}
-
 /// What a header says, before anything of it is known but the size.
 pub(crate) fn info(format: &'static str, columns: usize, rows: usize) -> Info {
     Info {

@@ -4,9 +4,9 @@
 //!
 //! NetCDF Climate and Forecast (CF) Metadata Conventions, 1.11; GMT, "Cookbook: GMT file formats".
 
-use super::{Input, assume_degrees, info, metres_of_unit};
+use super::{Input, assume_degrees, info};
 use crate::voids::VoidRule;
-use crate::{Crs, Error, Georeference, Info, Level, Registration, Source};
+use crate::{Crs, Error, Georeference, Info, Level, Registration, Source, metres_of_unit_name};
 use littoral::field::Window;
 use netcdf_reader::{NcFile, NcMetadataMode, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable};
 
@@ -154,7 +154,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
 
     info.nodata = number(variable, "_FillValue").or(number(variable, "missing_value"));
     let unit = text(variable, "units").unwrap_or_default();
-    match metres_of_unit(&unit) {
+    match metres_of_unit_name(&unit) {
         Some(metres) => info.vertical_metres = metres,
         None if unit.is_empty() => {}
         None => info.warnings.push(format!("heights are in {unit:?}, which is not a known unit: taken as metres")),
@@ -208,13 +208,14 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
 
 fn broken(name: &std::path::Path, error: &netcdf_reader::Error) -> Error {
     let shown = name.display();
-    Error::content(
-        name,
-        format!(
-            "expected a NetCDF file that can be decoded, got: {error}; if other programs read it, convert it with \
-             `gdal_translate -of GTiff {shown} land.tif`"
+    let hint = match error {
+        netcdf_reader::Error::UnsupportedVersion(_) | netcdf_reader::Error::InvalidMagic => "it is damaged".into(),
+        _ => format!(
+            "get it again if it is cut off or damaged; if other programs read it, `gdal_translate -of GTiff {shown} land.tif` \
+             converts it"
         ),
-    )
+    };
+    Error::content(name, format!("expected a NetCDF file that can be decoded, got: {error}; {hint}"))
 }
 
 /// The variable of heights: on two dimensions or more, of numbers, called or described so; else the first on a grid.
