@@ -82,6 +82,7 @@ impl TiffSource {
             scale: notes.scale.unwrap_or(1.0),
             offset: notes.offset.unwrap_or(0.0),
             metres: stated.unwrap_or(1.0),
+            ..VoidRule::default()
         };
         if stated.is_none()
             && let Crs::Projected { metres, .. } = placement.crs
