@@ -39,7 +39,7 @@ pub fn coast_shot(size: UVec2) -> Shot {
     Shot {
         view: coast::view(size),
         sun: Sun::new(azimuth, elevation),
-        air: Air { visibility: 24_000.0, ..Air::default() },
+        air: Air { visibility: 40_000.0, ..Air::default() },
         style: Style::Natural,
     }
 }

@@ -85,7 +85,7 @@ impl Picture {
             Exposure::Automatic => self.grey(),
             Exposure::Grey(grey) => grey,
         };
-        let scale = 0.21 / grey.max(1e-9) * how.compensation.exp2();
+        let scale = 0.30 / grey.max(1e-9) * how.compensation.exp2();
         self.radiance
             .par_iter()
             .map(|p| {
@@ -114,9 +114,9 @@ fn film(light: Vec3) -> Vec3 {
     let x = (INSET * light.max(Vec3::ZERO)).map(|v| (v.max(1e-10).log2().clamp(LEAST, MOST) - LEAST) / (MOST - LEAST));
     let (x2, x4) = (x * x, x * x * x * x);
     let curve = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.002_32;
-    let curve = curve.clamp(Vec3::ZERO, Vec3::ONE).map(|v| v.powf(1.18));
+    let curve = curve.clamp(Vec3::ZERO, Vec3::ONE).map(|v| v.powf(1.35));
     let grey = Vec3::splat(luminance(curve.to_array()));
-    OUTSET * (grey + (curve - grey) * 1.28).clamp(Vec3::ZERO, Vec3::ONE)
+    OUTSET * (grey + (curve - grey) * 1.40).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
 /// Luminance of a linear Rec. 709 colour.
