@@ -1,6 +1,16 @@
 //! Where a file's samples lie: in its own coordinate system, in degrees, and in the engine's local metres.
+//!
+//! *Local metres* count from the middle of the raster, x along its columns, y along its rows, whichever way makes them
+//! right-handed with north up. A step between samples is as long as the ground is in the middle of the raster: for
+//! degrees by the radii of curvature of the WGS84 ellipsoid along the meridian and across it, for maps by their unit.
+//! Everything is affine; what the Earth's curvature adds away from the middle is left out, and said so above 5 degrees.
+//!
+//! Formulas: Bugayevskiy, Snyder. Map projections: a reference manual, chapter 1. 1995.
 
+use crate::Crs;
+use crate::crs::Projector;
 use glam::{DAffine2, DMat2, DVec2};
+use littoral::field::Window;
 
 /// Whether a file's samples stand for areas (pixel centres) or for points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,25 +19,6 @@ pub enum Registration {
     Area,
     /// Samples are points.
     Point,
-}
-
-/// The coordinate system of a file.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Crs {
-    /// Not stated.
-    Unknown,
-    /// Longitude and latitude in degrees.
-    Geographic {
-        /// What the file calls it, such as `EPSG:4326`.
-        name: String,
-    },
-    /// Eastings and northings.
-    Projected {
-        /// What the file calls it, such as `EPSG:32610`.
-        name: String,
-        /// Metres in one unit of its coordinates.
-        metres: f64,
-    },
 }
 
 /// From samples to coordinates to local metres.
@@ -42,6 +33,23 @@ pub struct Georeference {
     pub crs: Crs,
     /// Columns and rows of the full raster.
     pub size: [usize; 2],
+    /// Whether y counts southward, as in a picture that nobody has placed on the Earth: true for
+    /// [`Georeference::none`] and what is cut from it, false for everything that a file does place.
+    pub y_south: bool,
+}
+
+/// Half of WGS84's longer axis (m).
+const EQUATORIAL_RADIUS: f64 = 6_378_137.0;
+/// WGS84's first eccentricity, squared.
+const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_141_316e-3;
+
+/// Metres in a degree of longitude and in one of latitude on the WGS84 ellipsoid, at a latitude (degrees).
+pub fn metres_per_degree(latitude: f64) -> DVec2 {
+    let (sine, cosine) = latitude.clamp(-90.0, 90.0).to_radians().sin_cos();
+    let w = 1.0 - ECCENTRICITY_SQUARED * sine * sine;
+    let across = EQUATORIAL_RADIUS / w.sqrt();
+    let along = EQUATORIAL_RADIUS * (1.0 - ECCENTRICITY_SQUARED) / (w * w.sqrt());
+    DVec2::new(across * cosine, along).map(f64::to_radians)
 }
 
 impl Georeference {
@@ -52,13 +60,237 @@ impl Georeference {
             registration: Registration::Area,
             crs: Crs::Unknown,
             size: [columns, rows],
+            y_south: true,
         }
+    }
+
+    /// The same ground in other numbers of columns and rows: for overviews and rasters averaged down.
+    pub fn resized(&self, columns: usize, rows: usize) -> Georeference {
+        let [x, a, b, y, d, e] = self.geotransform;
+        let across = self.size[0] as f64 / columns as f64;
+        let down = self.size[1] as f64 / rows as f64;
+        let geotransform = [x, a * across, b * down, y, d * across, e * down];
+        Georeference { geotransform, size: [columns, rows], ..self.clone() }
+    }
+
+    /// A part of the same grid.
+    pub fn window(&self, window: Window) -> Georeference {
+        let [x, a, b, y, d, e] = self.geotransform;
+        let (c, r) = (window.column as f64, window.row as f64);
+        let geotransform = [x + a * c + b * r, a, b, y + d * c + e * r, d, e];
+        Georeference { geotransform, size: [window.columns, window.rows], ..self.clone() }
+    }
+
+    /// The six numbers of a world file's text (`.tfw`, `.wld` …), which speaks of pixel centres, as a geotransform of
+    /// corners; `None` if the text is not six finite numbers that span an area.
+    pub fn geotransform_of_world_file(text: &str) -> Option<[f64; 6]> {
+        let mut numbers = text.split_whitespace().map(|word| word.replace(',', ".").parse::<f64>());
+        let mut next = || numbers.next()?.ok().filter(|n| n.is_finite());
+        // The order is A D B E C F: x steps first, then y, then the middle of the first pixel.
+        let [a, d, b, e, c, f] = [next()?, next()?, next()?, next()?, next()?, next()?];
+        (a * e - b * d != 0.0).then_some([c - 0.5 * (a + b), a, b, f - 0.5 * (d + e), d, e])
     }
 
     /// Coordinates in the file's system from (column, row), where whole numbers are samples.
     pub fn crs_from_sample(&self) -> DAffine2 {
+        let linear = self.step();
+        let origin = DVec2::new(self.geotransform[0], self.geotransform[3]);
+        DAffine2::from_mat2_translation(linear, origin + linear * DVec2::splat(0.5))
+    }
+
+    /// Local metres from (column, row) of the file's grid, where whole numbers are samples.
+    pub fn local_from_sample(&self) -> DAffine2 {
+        let [flip_columns, flip_rows] = self.flips();
+        let sign = DVec2::new(if flip_columns { -1.0 } else { 1.0 }, if flip_rows { -1.0 } else { 1.0 });
+        let middle = DVec2::new(self.size[0] as f64 - 1.0, self.size[1] as f64 - 1.0) * 0.5;
+        let scale = sign * self.spacing();
+        DAffine2::from_scale_angle_translation(scale, 0.0, -scale * middle)
+    }
+
+    /// Local metres from coordinates in the file's system. Longitudes may be whole turns away from the file's: see
+    /// [`Georeference::near`].
+    pub fn local_from_crs(&self) -> DAffine2 {
+        self.local_from_sample() * self.crs_from_sample().inverse()
+    }
+
+    /// Coordinates in the file's system from local metres.
+    pub fn crs_from_local(&self) -> DAffine2 {
+        self.crs_from_sample() * self.local_from_sample().inverse()
+    }
+
+    /// The coordinates of the raster's middle.
+    pub fn middle(&self) -> DVec2 {
+        let size = DVec2::new(self.size[0] as f64, self.size[1] as f64);
+        DVec2::new(self.geotransform[0], self.geotransform[3]) + self.step() * (size * 0.5)
+    }
+
+    /// The same coordinates with a longitude within half a turn of the raster's middle, so that files in 0 … 360 degrees
+    /// and across the antimeridian understand −180 … 180. Other systems' coordinates stay as they are.
+    pub fn near(&self, crs: DVec2) -> DVec2 {
+        if !matches!(self.crs, Crs::Geographic { .. }) {
+            return crs;
+        }
+        let middle = self.middle().x;
+        let turns = ((crs.x - middle) / 360.0).round();
+        DVec2::new(crs.x - 360.0 * turns, crs.y)
+    }
+
+    /// Coordinates in the file's system from WGS84 longitude and latitude (degrees). Between geographic systems the
+    /// difference of their datums, up to a few hundred metres, is left out.
+    ///
+    /// # Errors
+    /// A sentence that says why there is no answer: no coordinate system stated, one that cannot be computed, or a place
+    /// that the projection does not reach.
+    pub fn crs_from_lonlat(&self, lonlat: DVec2) -> Result<DVec2, String> {
+        match &self.crs {
+            Crs::Geographic { .. } => Ok(self.near(lonlat)),
+            crs => Projector::new(crs)?.forward(lonlat),
+        }
+    }
+
+    /// WGS84 longitude in (−180, 180] and latitude (degrees) from coordinates in the file's system.
+    ///
+    /// # Errors
+    /// As [`Georeference::crs_from_lonlat`].
+    pub fn lonlat_from_crs(&self, crs: DVec2) -> Result<DVec2, String> {
+        match &self.crs {
+            Crs::Geographic { .. } => Ok(DVec2::new(180.0 - (180.0 - crs.x).rem_euclid(360.0), crs.y)),
+            crs_named => Projector::new(crs_named)?.inverse(crs),
+        }
+    }
+
+    /// Distance between samples along columns and along rows (m), in the middle of the raster.
+    pub fn spacing(&self) -> DVec2 {
+        let metric = self.metric();
+        DVec2::new(metric.x_axis.length(), metric.y_axis.length())
+    }
+
+    /// Whether the file's columns, and its rows, run against the local x and y.
+    pub fn flips(&self) -> [bool; 2] {
+        let metric = self.metric();
+        // Right-handed: both or neither turned for grids that are so already, else one of them. Of the two ways left, the
+        // one with y nearer to north.
+        if metric.determinant() > 0.0 {
+            let against = metric.y_axis.y < 0.0 || (metric.y_axis.y == 0.0 && metric.x_axis.x < 0.0);
+            [against, against]
+        } else {
+            let rows = metric.y_axis.y < 0.0 || (metric.y_axis.y == 0.0 && metric.x_axis.x > 0.0);
+            [!rows, rows]
+        }
+    }
+
+    /// The angle (rad) from the local y axis to the file's y axis (grid north), counter-clockwise positive: grid north
+    /// lies along (−sin, cos) of it. Zero for grids that are not rotated.
+    pub fn grid_north(&self) -> f64 {
+        let [_, flip_rows] = self.flips();
+        let metric = self.metric();
+        let up = if flip_rows { -metric.y_axis } else { metric.y_axis };
+        // In the system's own axes the raster's y points along `up`; north, seen from it, lies the other way round.
+        up.x.atan2(up.y)
+    }
+
+    /// The angle (rad) from the local y axis to true north in the middle of the raster, counter-clockwise positive: grid
+    /// north and the convergence of the meridians. Grid north where no projection is known to compute it from.
+    pub fn true_north(&self) -> f64 {
+        self.grid_north() + self.convergence().unwrap_or(0.0)
+    }
+
+    /// The angle (rad) from grid north to true north, counter-clockwise positive; `None` if it cannot be computed.
+    fn convergence(&self) -> Option<f64> {
+        let Crs::Projected { .. } = self.crs else { return None };
+        let projector = Projector::new(&self.crs).ok()?;
+        let middle = self.middle();
+        let lonlat = projector.inverse(middle).ok()?;
+        let step = DVec2::new(0.0, if lonlat.y > 0.0 { -1e-4 } else { 1e-4 });
+        let north = (projector.forward(lonlat + step).ok()? - projector.forward(lonlat).ok()?) * step.y.signum();
+        (north.length() > 0.0).then(|| (-north.x).atan2(north.y))
+    }
+
+    /// Map lengths over true ones in the middle of the raster, along x and y, where a projection is known.
+    fn map_scale(&self) -> Option<DVec2> {
+        let Crs::Projected { metres, .. } = self.crs else { return None };
+        let projector = Projector::new(&self.crs).ok()?;
+        let middle = self.middle();
+        let lonlat = projector.inverse(middle).ok()?;
+        let stride = 50.0 / metres;
+        let true_length = |step: DVec2| {
+            let there = projector.inverse(middle + step).ok()?;
+            let mut degrees = there - lonlat;
+            degrees.x -= 360.0 * (degrees.x / 360.0).round();
+            let length = (degrees * metres_per_degree(lonlat.y)).length();
+            (length > 0.0 && length.is_finite()).then_some(length)
+        };
+        Some(DVec2::new(50.0 / true_length(DVec2::X * stride)?, 50.0 / true_length(DVec2::Y * stride)?))
+    }
+
+    /// The scale that lengths are corrected by: that of maps that stretch by more than 1 %, as Web Mercator does away from
+    /// the equator. Below that, map lengths are kept, so that they agree with everything else on the map.
+    fn stretch(&self) -> DVec2 {
+        let scale = self.map_scale().unwrap_or(DVec2::ONE);
+        let uneven = (scale - 1.0).abs().max_element() > 0.01;
+        if uneven && scale.is_finite() { scale } else { DVec2::ONE }
+    }
+
+    /// The file's units from a step in columns and rows.
+    fn step(&self) -> DMat2 {
         let g = self.geotransform;
-        let linear = DMat2::from_cols(DVec2::new(g[1], g[4]), DVec2::new(g[2], g[5]));
-        DAffine2::from_mat2_translation(linear, DVec2::new(g[0], g[3]) + linear * DVec2::splat(0.5))
+        DMat2::from_cols(DVec2::new(g[1], g[4]), DVec2::new(g[2], g[5]))
+    }
+
+    /// Metres east and north from a step in columns and rows, in the middle of the raster.
+    fn metric(&self) -> DMat2 {
+        let scale = match &self.crs {
+            Crs::Unknown => DVec2::new(1.0, if self.y_south { -1.0 } else { 1.0 }),
+            // At the pole itself a degree of longitude has no length; a grid there has one all the same.
+            Crs::Geographic { .. } => metres_per_degree(self.middle().y).max(DVec2::splat(1.0)),
+            Crs::Projected { metres, .. } => *metres / self.stretch(),
+        };
+        DMat2::from_diagonal(scale) * self.step()
+    }
+
+    /// What a user should know about this placement. One sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let corner = |c: usize, r: usize| {
+            let at = DVec2::new((self.size[0] * c) as f64, (self.size[1] * r) as f64);
+            DVec2::new(self.geotransform[0], self.geotransform[3]) + self.step() * at
+        };
+        let corners = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
+        let (low, high) = (corners.iter().copied().reduce(DVec2::min), corners.iter().copied().reduce(DVec2::max));
+        let (low, high) = (low.unwrap_or_default(), high.unwrap_or_default());
+        match &self.crs {
+            Crs::Geographic { .. } => {
+                let extent = (high - low).max_element();
+                if extent > 5.0 {
+                    warnings.push(format!(
+                        "{extent:.0} degrees of the Earth are laid flat: lengths are true in the middle only, at latitude {:.1}",
+                        self.middle().y
+                    ));
+                }
+                if low.y < -91.0 || high.y > 91.0 {
+                    warnings
+                        .push(format!("latitudes from {:.1} to {:.1} degrees are not of this Earth", low.y, high.y));
+                }
+            }
+            Crs::Projected { name, .. } => {
+                let stretch = self.stretch();
+                if stretch != DVec2::ONE {
+                    warnings.push(format!(
+                        "{name} stretches lengths by {:.3} here: local metres are true ones in the middle of the raster",
+                        stretch.y
+                    ));
+                }
+            }
+            Crs::Unknown => {}
+        }
+        let metric = self.metric();
+        let shear = metric.x_axis.normalize_or_zero().dot(metric.y_axis.normalize_or_zero());
+        if shear.abs() > 1e-3 {
+            warnings.push(format!(
+                "the grid's rows and columns meet at {:.1} degrees, but are laid out at right angles",
+                shear.acos().to_degrees()
+            ));
+        }
+        warnings
     }
 }

@@ -12,12 +12,20 @@
 //!   was expected, what was found and what to do, or a partial read with a [`Warning`](Info::warnings); never a panic.
 //! - Samples are points. Files that speak of areas are converted once, in [`Georeference`].
 
+mod bytes;
+mod crs;
 mod error;
 pub mod formats;
 mod georeference;
+mod reduce;
 mod source;
+mod survey;
 pub mod voids;
 
+pub use crs::{Crs, metres_of_unit_name, name_of_unit};
 pub use error::Error;
-pub use georeference::{Crs, Georeference, Registration};
-pub use source::{Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, open};
+pub use georeference::{Georeference, Registration, metres_per_degree};
+pub use source::{
+    Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, load_from, load_window, open,
+};
+pub use survey::{Survey, survey};

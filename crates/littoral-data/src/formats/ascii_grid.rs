@@ -136,6 +136,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
         registration: if corner { Registration::Area } else { Registration::Point },
         crs: crs_from_sidecar(&input),
         size: [columns, rows],
+        y_south: false,
     };
     info.nodata = header.get(&["nodata_value", "nodata", "nodatavalue", "no_data_value"]);
     assume_degrees(&mut info);

@@ -45,6 +45,7 @@ pub fn open(input: Input) -> Result<Box<dyn Source>, Error> {
         registration: Registration::Point,
         crs: Crs::Geographic { name: "EPSG:4326".into() },
         size: [columns as usize, rows as usize],
+        y_south: false,
     };
     info.vertical_datum = VerticalDatum::Named("EGM96".into());
     info.step = 1.0;

@@ -54,6 +54,14 @@ impl Input {
         self
     }
 
+    /// The bytes alone, to be read at any place by many threads.
+    pub(crate) fn into_bytes(self) -> crate::bytes::Bytes {
+        match self.bytes {
+            Bytes::Disk(file) => crate::bytes::Bytes::File(file, self.length),
+            Bytes::Memory(bytes) => crate::bytes::Bytes::Memory(bytes.into_inner()),
+        }
+    }
+
     /// Length in bytes.
     pub fn length(&self) -> u64 {
         self.length
@@ -118,6 +126,14 @@ impl Input {
         if let Some((_, content)) = self.beside.iter().find(|(name, _)| name == extension) {
             return Some(content.clone());
         }
+        let path = self.sidecar_path(extension)?;
+        let mut content = Vec::new();
+        File::open(path).ok()?.take(LONGEST_SIDECAR + 1).read_to_end(&mut content).ok()?;
+        (content.len() as u64 <= LONGEST_SIDECAR).then_some(content)
+    }
+
+    /// Where the companion of this extension lies on disk, if there is one.
+    pub fn sidecar_path(&self, extension: &str) -> Option<PathBuf> {
         let Bytes::Disk(_) = self.bytes else { return None };
         let mut paths = [extension.to_owned(), extension.to_uppercase()].into_iter().flat_map(|extension| {
             let mut appended = OsString::from(&self.name);
@@ -125,10 +141,7 @@ impl Input {
             appended.push(&extension);
             [self.name.with_extension(&extension), PathBuf::from(appended)]
         });
-        let path = paths.find(|path| *path != self.name && path.is_file())?;
-        let mut content = Vec::new();
-        File::open(path).ok()?.take(LONGEST_SIDECAR + 1).read_to_end(&mut content).ok()?;
-        (content.len() as u64 <= LONGEST_SIDECAR).then_some(content)
+        paths.find(|path| *path != self.name && path.is_file())
     }
 
     /// The companion of this extension as text.

@@ -9,6 +9,7 @@ mod input;
 pub mod png;
 pub mod raw;
 pub mod text;
+pub mod tiff;
 pub mod tiles;
 
 pub use input::Input;
@@ -36,6 +37,9 @@ pub fn open_input(mut input: Input) -> Result<Box<dyn Source>, Error> {
     let head = input.head(HEAD)?;
     if head.is_empty() {
         return Err(input.error("expected a height file, got an empty file"));
+    }
+    if tiff::sniff(&head) {
+        return tiff::open_input(input);
     }
     if png::sniff(&head) {
         return png::open(input);

@@ -153,7 +153,8 @@ mod tests {
     #[test]
     fn every_level_keeps_the_mean() {
         let size = UVec2::new(13, 6);
-        let texels: Vec<[u8; 3]> = (0..size.x * size.y).map(|i| [(i * 37 % 256) as u8, (i * 91 % 256) as u8, 7]).collect();
+        let texels: Vec<[u8; 3]> =
+            (0..size.x * size.y).map(|i| [(i * 37 % 256) as u8, (i * 91 % 256) as u8, 7]).collect();
         let even = Texture::from_srgb(UVec2::new(16, 8), &vec![[128, 3, 250]; 128]);
         for level in &even.levels {
             for t in &level.texels {

@@ -4,16 +4,21 @@
 //! ray hits it from above and from below alike, at the first point of the sheet at a distance in [0, reach]; a ray that
 //! starts on the sheet hits it at 0. Through holes and under the sheet's edges rays pass.
 
-mod walk;
-
+mod bulk;
+mod lanes;
 mod profile;
+mod scene;
 mod section;
 mod sight;
 mod slope;
+mod stream;
 mod viewshed;
+mod walk;
 
+pub use bulk::{RayCaster, Simd};
 pub use profile::{ProfilePoint, ProfilePoints, ProfileSummary};
 pub use sight::{Curvature, GRAZE, Obstacle, Sight, SightError, Station};
+pub use stream::LocalRay;
 pub use viewshed::{Viewshed, ViewshedCount};
 
 use crate::field::Land;

@@ -236,5 +236,11 @@ fn patch_root(heights: [f64; 4], from: DVec2, to: DVec2, z0: f64, z1: f64) -> Op
     let slope = f1 - f0 - bend;
     let disc = slope * slope - 4.0 * bend * f0;
     let dips = bend > 0.0 && slope < 0.0 && slope + 2.0 * bend > 0.0 && disc >= 0.0;
-    (f1 <= 0.0 || dips).then(|| (2.0 * f0 / (disc.max(0.0).sqrt() - slope)).clamp(0.0, 1.0))
+    if !(f1 <= 0.0 || dips) {
+        return None;
+    }
+    // The smaller positive root, without a difference of nearly equal numbers.
+    let root = disc.max(0.0).sqrt();
+    let s = if slope < 0.0 { 2.0 * f0 / (root - slope) } else { (slope + root) / (-2.0 * bend) };
+    Some(s.clamp(0.0, 1.0))
 }

@@ -1,0 +1,199 @@
+//! From the bytes of samples to heights: byte order, predictors, number types.
+//!
+//! Based on: Adobe. TIFF revision 6.0, section 14 (horizontal differencing). 1992; Adobe Photoshop TIFF Technical Note 3
+//! (the floating-point predictor: each row's bytes sorted by significance, highest first, then differenced). 2005.
+
+use crate::voids::VoidRule;
+
+/// The number type of samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub(super) enum SampleKind {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F16,
+    F32,
+    F64,
+}
+
+impl SampleKind {
+    /// Bytes of one sample.
+    pub(super) fn size(self) -> usize {
+        match self {
+            SampleKind::U8 | SampleKind::I8 => 1,
+            SampleKind::U16 | SampleKind::I16 | SampleKind::F16 => 2,
+            SampleKind::U32 | SampleKind::I32 | SampleKind::F32 => 4,
+            SampleKind::U64 | SampleKind::I64 | SampleKind::F64 => 8,
+        }
+    }
+
+    /// Whether samples are floating-point numbers.
+    pub(super) fn is_float(self) -> bool {
+        matches!(self, SampleKind::F16 | SampleKind::F32 | SampleKind::F64)
+    }
+}
+
+/// What was done to rows before compression.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Predictor {
+    /// Nothing.
+    None,
+    /// Each sample holds the difference from its left neighbour.
+    Horizontal,
+    /// Bytes sorted by significance, then differenced.
+    Float,
+}
+
+/// Turns the bytes of one row, as decompressed, into native numbers. `interleaved` samples make a pixel; `scratch` is as
+/// long as the row at least.
+pub(super) fn restore_row(
+    row: &mut [u8],
+    size: usize,
+    little: bool,
+    predictor: Predictor,
+    interleaved: usize,
+    scratch: &mut Vec<u8>,
+) {
+    let native = little == cfg!(target_endian = "little");
+    if predictor == Predictor::Float {
+        for at in interleaved..row.len() {
+            row[at] = row[at].wrapping_add(row[at - interleaved]);
+        }
+        scratch.clear();
+        scratch.extend_from_slice(row);
+        let samples = row.len() / size;
+        // Plane 0 holds the highest bytes, whatever the byte order of the file.
+        for (plane, bytes) in scratch.chunks_exact(samples).take(size).enumerate() {
+            let place = if cfg!(target_endian = "little") { size - 1 - plane } else { plane };
+            for (out, &byte) in row[place..].iter_mut().step_by(size).zip(bytes) {
+                *out = byte;
+            }
+        }
+        return;
+    }
+    if !native && size > 1 {
+        row.chunks_exact_mut(size).for_each(<[u8]>::reverse);
+    }
+    if predictor == Predictor::Horizontal {
+        match size {
+            1 => {
+                for at in interleaved..row.len() {
+                    row[at] = row[at].wrapping_add(row[at - interleaved]);
+                }
+            }
+            2 => accumulate(row, interleaved, u16::from_ne_bytes, u16::wrapping_add, u16::to_ne_bytes),
+            4 => accumulate(row, interleaved, u32::from_ne_bytes, u32::wrapping_add, u32::to_ne_bytes),
+            _ => accumulate(row, interleaved, u64::from_ne_bytes, u64::wrapping_add, u64::to_ne_bytes),
+        }
+    }
+}
+
+/// The running sum of each of the interleaved sequences. Monomorphic in everything: inlines to a loop over one register.
+#[inline(always)]
+fn accumulate<T: Copy + Default, const N: usize>(
+    row: &mut [u8],
+    interleaved: usize,
+    from: fn([u8; N]) -> T,
+    add: fn(T, T) -> T,
+    to: fn(T) -> [u8; N],
+) {
+    let (words, _) = row.as_chunks_mut::<N>();
+    if interleaved == 1 {
+        let mut sum = T::default();
+        for word in words {
+            sum = add(sum, from(*word));
+            *word = to(sum);
+        }
+        return;
+    }
+    for at in interleaved..words.len() {
+        words[at] = to(add(from(words[at]), from(words[at - interleaved])));
+    }
+}
+
+/// Heights (m) of every `stride`-th of a row's native numbers, from the first; NaN where void.
+pub(super) fn heights_of_row(row: &[u8], kind: SampleKind, stride: usize, rule: &VoidRule, heights: &mut [f32]) {
+    #[inline(always)]
+    fn each<const N: usize>(
+        row: &[u8],
+        stride: usize,
+        rule: &VoidRule,
+        heights: &mut [f32],
+        number: impl Fn([u8; N]) -> f64,
+    ) {
+        let (words, _) = row.as_chunks::<N>();
+        if stride == 1 {
+            for (height, word) in heights.iter_mut().zip(words) {
+                *height = rule.height(number(*word));
+            }
+        } else {
+            for (height, word) in heights.iter_mut().zip(words.iter().step_by(stride)) {
+                *height = rule.height(number(*word));
+            }
+        }
+    }
+    match kind {
+        SampleKind::U8 => each(row, stride, rule, heights, |b: [u8; 1]| b[0].into()),
+        SampleKind::I8 => each(row, stride, rule, heights, |b| i8::from_ne_bytes(b).into()),
+        SampleKind::U16 => each(row, stride, rule, heights, |b| u16::from_ne_bytes(b).into()),
+        SampleKind::I16 => each(row, stride, rule, heights, |b| i16::from_ne_bytes(b).into()),
+        SampleKind::U32 => each(row, stride, rule, heights, |b| u32::from_ne_bytes(b).into()),
+        SampleKind::I32 => each(row, stride, rule, heights, |b| i32::from_ne_bytes(b).into()),
+        SampleKind::U64 => each(row, stride, rule, heights, |b| u64::from_ne_bytes(b) as f64),
+        SampleKind::I64 => each(row, stride, rule, heights, |b| i64::from_ne_bytes(b) as f64),
+        SampleKind::F16 => each(row, stride, rule, heights, |b| half::f16::from_ne_bytes(b).to_f64()),
+        SampleKind::F32 => each(row, stride, rule, heights, |b| f32::from_ne_bytes(b).into()),
+        SampleKind::F64 => each(row, stride, rule, heights, f64::from_ne_bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn predictors_undo_what_writers_do() {
+        // Two interleaved sequences of f32: differenced by hand, byte planes highest first.
+        let numbers: Vec<f32> = (0..12).map(|i| 100.0 + 1.25 * i as f32 - (i % 3) as f32).collect();
+        let native: Vec<u8> = numbers.iter().flat_map(|n| n.to_ne_bytes()).collect();
+        for interleaved in [1, 2, 3] {
+            let mut planes: Vec<u8> =
+                (0..4).flat_map(|plane| numbers.iter().map(move |n| n.to_be_bytes()[plane])).collect();
+            for at in (interleaved..planes.len()).rev() {
+                planes[at] = planes[at].wrapping_sub(planes[at - interleaved]);
+            }
+            for little in [true, false] {
+                let mut row = planes.clone();
+                restore_row(&mut row, 4, little, Predictor::Float, interleaved, &mut Vec::new());
+                assert_eq!(row, native);
+            }
+            for (size, little) in [(1, true), (2, true), (2, false), (4, true), (4, false), (8, true), (8, false)] {
+                let number = |i: usize| (i as u64 * 0x0123_4567_89AB_CDEF).rotate_left(i as u32);
+                let bytes = |value: u64, little: bool| {
+                    let mut bytes = value.to_le_bytes()[..size].to_vec();
+                    if !little {
+                        bytes.reverse();
+                    }
+                    bytes
+                };
+                let stored: Vec<u8> = (0..12)
+                    .flat_map(|i| {
+                        let left = if i < interleaved { 0 } else { number(i - interleaved) };
+                        bytes(number(i).wrapping_sub(left), little)
+                    })
+                    .collect();
+                let expected: Vec<u8> =
+                    (0..12).flat_map(|i| bytes(number(i), cfg!(target_endian = "little"))).collect();
+                let mut row = stored;
+                restore_row(&mut row, size, little, Predictor::Horizontal, interleaved, &mut Vec::new());
+                assert_eq!(row, expected, "size {size}, little {little}, interleaved {interleaved}");
+            }
+        }
+    }
+}

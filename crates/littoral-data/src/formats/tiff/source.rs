@@ -1,0 +1,342 @@
+//! An opened GeoTIFF: its resolutions, and windows of heights from them.
+
+use super::codec::Scratch;
+use super::directory::Container;
+use super::geokeys::{band_notes, placement};
+use super::heights::{Chunk, decode};
+use super::image::{Compression, Image, tag};
+use super::samples::SampleKind;
+use crate::bytes::Bytes;
+use crate::crs::{US_SURVEY_FOOT, metres_of_unit_name};
+use crate::formats::Input;
+use crate::voids::VoidRule;
+use crate::{Crs, Error, Georeference, Info, Level, Source};
+use littoral::field::Window;
+use rayon::prelude::*;
+use std::collections::{HashMap, HashSet, VecDeque};
+use std::path::{Path, PathBuf};
+
+/// Decoded heights kept for the next window (bytes), at least one chunk in any case.
+const CACHE: usize = 32 << 20;
+/// Decoded chunks of one parallel batch together (bytes), at least one chunk in any case.
+const BATCH: usize = 16 << 20;
+
+/// An opened GeoTIFF.
+pub(super) struct TiffSource {
+    path: PathBuf,
+    /// The file, and the one with overviews beside it.
+    containers: Vec<Container>,
+    /// For each level the container it lies in, and its layout.
+    images: Vec<(usize, Image)>,
+    levels: Vec<Level>,
+    info: Info,
+    rule: VoidRule,
+    /// Chunks that a window took only a part of, the most recent last.
+    cache: VecDeque<((usize, usize), Vec<f32>)>,
+    cached: usize,
+    /// Chunks found broken, each noted once, and the place of the warning that counts them.
+    broken: HashSet<(usize, usize)>,
+    broken_warning: Option<usize>,
+    first_problem: String,
+    /// Chunks found not stored although no no-data value says what they stand for.
+    missing: HashSet<(usize, usize)>,
+    missing_warning: Option<usize>,
+}
+
+impl TiffSource {
+    /// Opens the file and its companions.
+    pub(super) fn open(input: Input) -> Result<TiffSource, Error> {
+        let path = input.name.clone();
+        let error = |problem: String| Error::content(&path, problem);
+        let sidecar = |names: &[&str]| {
+            let content = names.iter().find_map(|name| input.sidecar(name))?;
+            Some(String::from_utf8_lossy(&content).into_owned())
+        };
+        let world = sidecar(&["tfw", "tifw", "tiffw", "wld"]);
+        let projection = sidecar(&["prj"]);
+        let outside = input.sidecar_path("ovr");
+        let file = Container::new(input.into_bytes()).map_err(error)?;
+        let (directories, chain_warning) = file.directories().map_err(error)?;
+        let mut warnings: Vec<String> = chain_warning.into_iter().collect();
+
+        let role = |index: usize| {
+            let directory = directories.get(index)?;
+            file.unsigned(directory, tag::NEW_SUBFILE_TYPE).ok().flatten()
+        };
+        let main = (0..directories.len()).find(|&index| role(index).unwrap_or(0) & 5 == 0).unwrap_or(0);
+        let directory = &directories[main];
+        let image = Image::new(&file, directory).map_err(error)?;
+
+        let placement = placement(&file, directory);
+        warnings.extend(placement.warnings);
+        let notes = file.text(directory, tag::GDAL_METADATA).map(|xml| band_notes(&xml)).unwrap_or_default();
+        let nodata = file.text(directory, tag::GDAL_NODATA).and_then(|text| number(&text));
+        let unit = notes.unit.as_deref().and_then(metres_of_unit_name);
+        if let (Some(name), None) = (notes.unit.as_deref().filter(|name| !name.is_empty()), unit) {
+            warnings.push(format!("the unit of the heights, \"{name}\", is no length; metres are taken"));
+        }
+        let stated = unit.or(placement.vertical_metres);
+        let rule = VoidRule {
+            nodata,
+            scale: notes.scale.unwrap_or(1.0),
+            offset: notes.offset.unwrap_or(0.0),
+            metres: stated.unwrap_or(1.0),
+        };
+        if stated.is_none()
+            && let Crs::Projected { metres, .. } = placement.crs
+            && (metres - 1.0).abs() > 1e-9
+            && (metres - US_SURVEY_FOOT).abs() < 0.01
+        {
+            warnings.push("the map is in feet, but the unit of the heights is not stated; metres are taken".into());
+        }
+
+        let mut georeference = Georeference::none(image.columns, image.rows);
+        georeference.registration = placement.registration;
+        georeference.crs = placement.crs;
+        if georeference.crs == Crs::Unknown
+            && let Some(text) = projection
+        {
+            georeference.crs = Crs::from_wkt(&text);
+        }
+        if let Some(geotransform) = placement.geotransform.or_else(|| Georeference::geotransform_of_world_file(&world?))
+        {
+            georeference.y_south = false;
+            georeference.geotransform = geotransform;
+        }
+        if image.bands > 1 {
+            let alpha = if image.alpha.is_some() { ", and voids from the alpha band" } else { "" };
+            warnings.push(format!("{} bands: the first is taken as the height{alpha}", image.bands));
+        }
+        let step = if image.kind.is_float() { 0.0 } else { (rule.scale * rule.metres).abs() };
+        if matches!(image.kind, SampleKind::U8 | SampleKind::I8) {
+            warnings.push(format!("8-bit samples: heights come in steps of {step} m"));
+        }
+        let full_size = role(main).unwrap_or(0) & 5 == 0;
+        let others = directories.len() - (0..directories.len()).filter(|&i| role(i).unwrap_or(0) & 5 != 0).count();
+        if full_size && others > 1 {
+            warnings.push(format!("{others} images in one file: the first is read"));
+        }
+
+        let mut images = vec![(0, image)];
+        for index in (0..directories.len()).filter(|&index| index != main) {
+            // Bit 0: a smaller version; bit 2: a mask.
+            if role(index).unwrap_or(0) & 5 == 1 {
+                match Image::new(&file, &directories[index]) {
+                    Ok(image) => images.push((0, image)),
+                    Err(problem) => warnings.push(format!("an overview is left out: {problem}")),
+                }
+            }
+        }
+        let mut containers = vec![file];
+        if let Some(outside) = outside.and_then(|file| overviews_beside(&file, &mut warnings)) {
+            let (found, _) = outside.directories().unwrap_or_default();
+            images.extend(found.iter().filter_map(|directory| Some((1, Image::new(&outside, directory).ok()?))));
+            containers.push(outside);
+        }
+        keep_overviews(&mut images);
+        let levels: Vec<Level> =
+            images.iter().map(|(_, image)| Level { columns: image.columns, rows: image.rows }).collect();
+        let mut info = Info {
+            format: "GTiff",
+            columns: levels[0].columns,
+            rows: levels[0].rows,
+            nodata,
+            georeference,
+            vertical_metres: rule.metres,
+            vertical_datum: placement.vertical_datum,
+            step,
+            warnings,
+        };
+        crate::formats::assume_degrees(&mut info);
+        Ok(TiffSource {
+            path,
+            containers,
+            images,
+            levels,
+            info,
+            rule,
+            cache: VecDeque::new(),
+            cached: 0,
+            broken: HashSet::new(),
+            broken_warning: None,
+            first_problem: String::new(),
+            missing: HashSet::new(),
+            missing_warning: None,
+        })
+    }
+
+    /// Copies the part of a decoded chunk that lies within the window.
+    fn paste(image: &Image, chunk: usize, heights: &[f32], window: Window, out: &mut [f32]) {
+        let [columns, rows] = image.extent(chunk);
+        let (x, y) = (chunk % image.across * image.chunk[0], chunk / image.across * image.chunk[1]);
+        if heights.len() != columns * rows {
+            return; // not stored: the window is void there already
+        }
+        let (left, right) = (x.max(window.column), (x + columns).min(window.column + window.columns));
+        let (top, bottom) = (y.max(window.row), (y + rows).min(window.row + window.rows));
+        for row in top..bottom {
+            let from = (row - y) * columns + left - x;
+            let to = (row - window.row) * window.columns + left - window.column;
+            out[to..to + right - left].copy_from_slice(&heights[from..from + right - left]);
+        }
+    }
+
+    /// Keeps a chunk for the next window, and forgets the oldest ones beyond the budget.
+    fn keep(&mut self, level: usize, chunk: usize, heights: Vec<f32>) {
+        self.cached += heights.len() * 4;
+        self.cache.push_back(((level, chunk), heights));
+        while self.cached > CACHE && self.cache.len() > 1 {
+            self.cached -= self.cache.pop_front().map_or(0, |(_, heights)| heights.len() * 4);
+        }
+    }
+
+    /// Notes what is wrong with a chunk, in one warning for all of them.
+    fn note(&mut self, level: usize, chunk: usize, decoded: &Chunk) {
+        let total: usize = self.images.iter().map(|(_, image)| image.across * image.down).sum();
+        if let Some(problem) = &decoded.problem
+            && self.broken.insert((level, chunk))
+        {
+            if self.broken.len() == 1 {
+                let image = &self.images[level].1;
+                let what = if image.tiled { "tile" } else { "strip" };
+                let row = chunk / image.across * image.chunk[1];
+                let column = chunk % image.across * image.chunk[0];
+                self.first_problem = format!("{what} at column {column}, row {row}: {problem}");
+            }
+            let text = format!(
+                "{} of {total} chunks are broken, and void where they cannot be read ({}); get the file again",
+                self.broken.len(),
+                self.first_problem
+            );
+            set_warning(&mut self.info.warnings, &mut self.broken_warning, text);
+        }
+        let sparse = decoded.heights.is_empty() && decoded.problem.is_none();
+        if sparse && self.rule.nodata.is_none() && self.missing.insert((level, chunk)) {
+            let text = format!("{} of {total} chunks are not stored in the file and void", self.missing.len());
+            set_warning(&mut self.info.warnings, &mut self.missing_warning, text);
+        }
+    }
+}
+
+impl Source for TiffSource {
+    fn info(&self) -> &Info {
+        &self.info
+    }
+
+    fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    fn block(&self, level: usize) -> [usize; 2] {
+        self.images[level].1.chunk
+    }
+
+    fn read(&mut self, level: usize, window: Window) -> Result<Vec<f32>, Error> {
+        let Level { columns, rows } = self.levels[level];
+        let inside = window.column.checked_add(window.columns).is_some_and(|end| end <= columns)
+            && window.row.checked_add(window.rows).is_some_and(|end| end <= rows);
+        if !inside {
+            return Err(Error::content(
+                &self.path,
+                format!("expected a window within {columns} × {rows} samples, got {window:?}"),
+            ));
+        }
+        let mut out = vec![f32::NAN; window.columns * window.rows];
+        if out.is_empty() {
+            return Ok(out);
+        }
+        let image = &self.images[level].1;
+        let across = window.column / image.chunk[0]..(window.column + window.columns).div_ceil(image.chunk[0]);
+        let down = window.row / image.chunk[1]..(window.row + window.rows).div_ceil(image.chunk[1]);
+        let all = image.across;
+        let chunks: Vec<usize> = down.flat_map(|y| across.clone().map(move |x| y * all + x)).collect();
+
+        let cached: HashMap<usize, usize> = (self.cache.iter().enumerate())
+            .filter_map(|(place, ((cached, chunk), _))| (*cached == level).then_some((*chunk, place)))
+            .collect();
+        let mut wanted = Vec::new();
+        for &chunk in &chunks {
+            match cached.get(&chunk) {
+                Some(&place) => Self::paste(image, chunk, &self.cache[place].1, window, &mut out),
+                None => wanted.push(chunk),
+            }
+        }
+        let batch = (BATCH / (image.chunk[0] * image.chunk[1] * 4).max(1)).clamp(1, 4096);
+        for batch in wanted.chunks(batch) {
+            let (container, image) = &self.images[level];
+            let file = &self.containers[*container];
+            let decoded: Vec<Chunk> = batch
+                .par_iter()
+                .map_init(
+                    || (Scratch::default(), Vec::new(), Vec::new()),
+                    |work, &chunk| decode(file, image, chunk, &self.rule, work),
+                )
+                .collect();
+            for (&chunk, decoded) in batch.iter().zip(decoded) {
+                let image = &self.images[level].1;
+                Self::paste(image, chunk, &decoded.heights, window, &mut out);
+                self.note(level, chunk, &decoded);
+                let image = &self.images[level].1;
+                let [columns, rows] = image.extent(chunk);
+                let (x, y) = (chunk % image.across * image.chunk[0], chunk / image.across * image.chunk[1]);
+                let whole = x >= window.column
+                    && y >= window.row
+                    && x + columns <= window.column + window.columns
+                    && y + rows <= window.row + window.rows;
+                // A chunk used up whole is not asked for again by anyone who reads in order.
+                if !whole && image.compression != Compression::None {
+                    self.keep(level, chunk, decoded.heights);
+                }
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Puts a warning where it was before, or at the end.
+fn set_warning(warnings: &mut Vec<String>, place: &mut Option<usize>, text: String) {
+    match *place {
+        Some(at) => warnings[at] = text,
+        None => {
+            *place = Some(warnings.len());
+            warnings.push(text);
+        }
+    }
+}
+
+/// A no-data value as GDAL writes it.
+fn number(text: &str) -> Option<f64> {
+    text.trim_matches([' ', '\0', '\n', '\r', '\t']).parse().ok()
+}
+
+/// Sorts overviews from fine to coarse and drops what is none: not smaller, or not of the same shape.
+fn keep_overviews(images: &mut Vec<(usize, Image)>) {
+    let (columns, rows) = (images[0].1.columns as f64, images[0].1.rows as f64);
+    images[1..].sort_by_key(|(_, image)| std::cmp::Reverse(image.columns));
+    let mut last = images[0].1.columns;
+    let mut first = true;
+    images.retain(|(_, image)| {
+        if std::mem::take(&mut first) {
+            return true;
+        }
+        let expected = image.columns as f64 * rows / columns;
+        // Writers round each size up, down or to the next; an overview of one row may stand for less than one.
+        let alike = (image.rows as f64 - expected).abs() <= 1.0 + rows / columns;
+        let keep = image.columns < last && alike;
+        if keep {
+            last = image.columns;
+        }
+        keep
+    });
+}
+
+/// A TIFF of overviews beside a file.
+fn overviews_beside(file: &Path, warnings: &mut Vec<String>) -> Option<Container> {
+    match Bytes::open(file).map_err(|error| error.to_string()).and_then(Container::new) {
+        Ok(container) => Some(container),
+        Err(problem) => {
+            warnings.push(format!("the overviews in {} are left out: {problem}", file.display()));
+            None
+        }
+    }
+}
