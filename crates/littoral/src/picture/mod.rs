@@ -27,7 +27,6 @@ mod skylight;
 mod spectrum;
 mod stage;
 mod texture;
-mod trace;
 mod water;
 
 pub use compose::{Shot, coast_shot, compose};
