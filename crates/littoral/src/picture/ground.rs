@@ -245,7 +245,7 @@ fn with_mist(land: &Land, level: f64, mist: f64) -> (Land, Vec<u8>) {
         }
     }
     span_membrane(&mut heights, columns, rows);
-    let fringe = (inner_columns.min(inner_rows) as f32 / 96.0).clamp(0.7, 4.0);
+    let fringe = (inner_columns.min(inner_rows) as f32 / 48.0).clamp(0.7, 12.0);
     let known = distances(&void, columns, rows)
         .into_iter()
         .map(|d| {

@@ -1,6 +1,7 @@
 //! From what a ray meets to the light it brings.
 
 use super::atmosphere::Veil;
+use super::cartography::relief;
 use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, natural};
@@ -70,13 +71,11 @@ const SHARED: u32 = 4;
 /// A piece of ground, lit by the sky.
 #[derive(Clone, Copy, Debug)]
 struct Facet {
-    material: Material,
     smooth: Vec3,
     /// Light of the sky that it throws back (kcd/m²).
     skylit: Vec3,
     /// Light of the unshaded sun that it throws back.
     sunlit: Vec3,
-    known: f32,
 }
 
 /// A piece of water.
@@ -100,6 +99,9 @@ impl Stage<'_> {
         index: u32,
         near: &mut Near,
     ) -> Shaded {
+        if self.scene.style == Style::Relief {
+            return self.painted(lens, direction, ahead);
+        }
         let position = match *ahead {
             Ahead::Sky => {
                 let light = lens.sky.radiance(direction) + lens.sky.sun_disc(direction);
@@ -132,6 +134,23 @@ impl Stage<'_> {
         shaded
     }
 
+    /// A cartographer's paper: no sun, no air, only tones.
+    fn painted(&self, lens: &Lens, direction: Vec3, ahead: &Ahead) -> Shaded {
+        let paper = Vec3::new(0.90, 0.89, 0.86);
+        let light = match *ahead {
+            Ahead::Ground { position } => {
+                let at = position.truncate();
+                let footprint = self.footprint(lens, (position - lens.eye).length() as f32, -direction.z);
+                let wet = self.scene.water.is_some_and(|w| w.covers(at));
+                let to_sun = self.sun.truncate().normalize_or(Vec2::new(-0.7, 0.7));
+                let ground = relief(&self.ground, &self.tints, at, position.z as f32, footprint, to_sun, wet);
+                paper.lerp(ground, self.ground.known(at))
+            }
+            _ => paper,
+        };
+        Shaded { light, through: Vec3::ONE, sky: matches!(ahead, Ahead::Sky), ..Shaded::default() }
+    }
+
     /// Width of a pixel at a distance on something whose normal makes this cosine with the eye (m). Slanted pixels are long; the samples
     /// within them see to that in part.
     fn footprint(&self, lens: &Lens, distance: f32, cosine: f32) -> f32 {
@@ -156,8 +175,14 @@ impl Stage<'_> {
         index: u32,
         near: &mut Near,
     ) -> Shaded {
+        let known = self.ground.known(position.truncate());
+        if known == 0.0 {
+            return Shaded { light: self.mist, ..Shaded::default() };
+        }
+        // The lines of a map are finer than a footprint: every sample looks for itself.
+        let shared = if self.is_map() { 1 } else { SHARED };
         let facet = match near.ground {
-            Some((at, uses, facet)) if uses < SHARED && close(at, distance, 0.02) => {
+            Some((at, uses, facet)) if uses < shared && close(at, distance, 0.02) => {
                 near.ground = Some((at, uses + 1, facet));
                 facet
             }
@@ -167,9 +192,6 @@ impl Stage<'_> {
                 facet
             }
         };
-        if facet.known == 0.0 {
-            return Shaded { light: self.mist, ..Shaded::default() };
-        }
         let mut shaded = Shaded { light: facet.skylit, ..Shaded::default() };
         if facet.sunlit != Vec3::ZERO {
             let lift = 0.02 * self.ground.spacing() + 1.5e-4 * distance;
@@ -177,9 +199,9 @@ impl Stage<'_> {
             let origin = (position - lens.eye).as_vec3() + facet.smooth * lift;
             shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
         }
-        if facet.known < 1.0 {
-            shaded.light = self.mist.lerp(shaded.light, facet.known);
-            shaded.sunlit *= facet.known;
+        if known < 1.0 {
+            shaded.light = self.mist.lerp(shaded.light, known);
+            shaded.sunlit *= known;
         }
         shaded
     }
@@ -187,7 +209,6 @@ impl Stage<'_> {
     /// The ground at a place, as a pixel sees it.
     fn facet(&self, lens: &Lens, direction: Vec3, position: DVec3, distance: f32) -> Facet {
         let at = position.truncate();
-        let known = self.ground.known(at);
         let rough = self.ground.surface(at, distance * lens.pixel);
         let normal_of = |s: &Surface| Vec3::new(-s.slope.x, -s.slope.y, 1.0).normalize();
         let footprint = self.footprint(lens, distance, -direction.dot(normal_of(&rough)));
@@ -207,17 +228,31 @@ impl Stage<'_> {
             true => material.albedo / PI * self.air.sunlight(position.z as f32) * (facing * (0.4 + 0.6 * material.openness)),
             false => Vec3::ZERO,
         };
-        Facet { material, smooth, skylit, sunlit, known }
+        Facet { smooth, skylit, sunlit }
     }
 
     fn material(&self, position: DVec3, surface: &Surface, footprint: f32) -> Material {
-        let water = self.scene.water.filter(|w| w.covers(position.truncate()) || position.z < w.level + 15.0);
-        match self.scene.style {
-            Style::Natural | Style::Image | Style::Tint | Style::Relief => {
-                let level = water.map(|w| w.level as f32);
-                natural(position, surface, self.ground.spacing(), footprint, level, &self.scene.climate)
-            }
+        let at = position.truncate();
+        let spacing = self.ground.spacing();
+        let even = |albedo: Vec3| {
+            let normal = normal_of_slope(surface.slope);
+            let openness = (1.0 - 0.6 * surface.hollow * spacing.max(footprint)).clamp(0.75, 1.0);
+            Material { albedo, normal, openness, wet: 0.0 }
+        };
+        if self.scene.style == Style::Tint {
+            let wet = self.scene.water.is_some_and(|w| w.covers(at));
+            return even(self.tints.colour(position.z as f32, wet));
         }
+        if let (Style::Image, Some(drape)) = (self.scene.style, self.scene.drape) {
+            let span = f64::from(footprint);
+            return match drape.colour(at, DVec2::X * span, DVec2::Y * span) {
+                // Cameras' pictures hold light, not albedo: what is white in them reflects about 0.6.
+                Some(colour) => even(colour * 0.6),
+                None => even(Vec3::splat(0.25)),
+            };
+        }
+        let water = self.scene.water.filter(|w| w.covers(at) || position.z < w.level + 15.0);
+        natural(position, surface, spacing, footprint, water.map(|w| w.level as f32), &self.scene.climate)
     }
 
     #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]

@@ -1,12 +1,13 @@
 //! A scene made ready for pictures, and the tiles that pictures are made of.
 
 use super::atmosphere::{Atmosphere, EARTH, Sky};
+use super::cartography::Tints;
 use super::ground::Ground;
 use super::sampler::Sampler;
 use super::sea::Depths;
 use super::shade::{Ahead, Near, Shaded};
 use super::skylight::{Skylight, irradiance};
-use super::{Picture, Scene, Settings};
+use super::{Medium, Picture, Scene, Settings, Style};
 use crate::raycast::{LocalRay, RayCaster};
 use crate::space::View;
 use glam::{DVec3, UVec2, Vec2, Vec3};
@@ -26,6 +27,7 @@ pub struct Stage<'a> {
     pub(super) sun: Vec3,
     /// Radiance of mist (kcd/m²).
     pub(super) mist: Vec3,
+    pub(super) tints: Tints,
 }
 
 /// What a view adds to a stage.
@@ -55,7 +57,9 @@ impl<'a> Stage<'a> {
     /// Makes `scene` ready.
     pub fn new(scene: &Scene<'a>) -> Stage<'a> {
         let sun = scene.sun.direction(scene.north).as_vec3();
-        let ground = Ground::new(scene.land, scene.water);
+        // On maps the bed is ground like any other, and water only a colour.
+        let map = matches!(scene.style, Style::Tint | Style::Relief);
+        let ground = Ground::new(scene.land, scene.water.filter(|_| !map));
         let air = Atmosphere::new(&scene.air, &scene.sun);
         let range = scene.land.height_range();
         let level = scene.water.map_or(f32::NEG_INFINITY, |w| w.level as f32);
@@ -64,7 +68,13 @@ impl<'a> Stage<'a> {
         let skylight = Skylight::new(&ground, &air, &sky, sun, Vec3::new(0.150, 0.130, 0.090));
         let open = irradiance(&skylight.open, Vec3::Z);
         let mist = 0.42 / std::f32::consts::PI * (air.sunlight(middle.max(0.0)) * sun.z.max(0.0) + open);
-        Stage { scene: *scene, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
+        let tints = Tints { low: range.low, high: range.high, level };
+        Stage { scene: *scene, tints, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
+    }
+
+    /// Whether the style is that of a map, on which water is a colour.
+    pub(super) fn is_map(&self) -> bool {
+        matches!(self.scene.style, Style::Tint | Style::Relief)
     }
 
     /// What `view` sees. `progress` is told the fraction done, now and then, from any thread.
@@ -88,6 +98,11 @@ impl<'a> Stage<'a> {
             })
             .collect();
         let mut picture = Picture::empty(view.size, view.eye);
+        picture.medium = match self.scene.style {
+            Style::Natural | Style::Image => Medium::Photograph,
+            Style::Tint => Medium::Model,
+            Style::Relief => Medium::Paper,
+        };
         for (i, pixels) in rendered.iter().enumerate() {
             let corner = UVec2::new(i as u32 % tiles.x, i as u32 / tiles.x) * TILE;
             let width = (view.size.x - corner.x).min(TILE) as usize;
@@ -180,7 +195,7 @@ impl<'a> Stage<'a> {
             let sample = &mut shaded[k];
             sample.light += mirrored * sample.mirror_share;
         }
-        let brightest = self.mist.max_element() * 30.0;
+        let brightest = self.mist.max_element().max(1.0) * 30.0;
         (0..pixels)
             .map(|i| {
                 let (mut radiance, mut coverage) = (Vec3::ZERO, 0.0);
@@ -198,7 +213,7 @@ impl<'a> Stage<'a> {
     fn ahead(&self, eye: DVec3, direction: Vec3, ground: f32) -> Ahead {
         let direction = direction.as_dvec3();
         let ground = f64::from(ground);
-        if let Some(water) = self.scene.water {
+        if let Some(water) = self.scene.water.filter(|_| !self.is_map()) {
             // Still water is level; beyond the raster it bends with the Earth, which sets the horizon.
             let rise = eye.z - water.level;
             if rise > 0.0 {
