@@ -6,6 +6,7 @@
 //! water in front if there is any, nothing missing in the frame and nothing in front of the lens. Land too wide or too flat for that
 //! is seen from above.
 
+use super::ground::Ground;
 use super::{Air, Style, Sun, Water};
 use crate::field::{Land, coast};
 use crate::raycast::LocalRay;
@@ -39,17 +40,18 @@ pub fn compose(land: &Land, water: Option<&Water>, size: UVec2) -> Shot {
     if range.is_empty() || extent > WIDEST_LANDSCAPE {
         return overhead(land, water, size);
     }
+    let ground = Ground::new(land, water);
     let candidates = candidates(land, water);
     let small = UVec2::new(24, (24 * size.y.max(1)).div_ceil(size.x.max(1)).clamp(8, 48));
     let mut judged: Vec<(f64, usize)> =
-        candidates.par_iter().enumerate().map(|(i, c)| (judge(land, water, c, small), i)).collect();
+        candidates.par_iter().enumerate().map(|(i, c)| (judge(&ground, water, c, small), i)).collect();
     // Best first; ties by number, so that the answer is the same everywhere.
     judged.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let finalists: Vec<usize> = judged.iter().take(24).map(|j| j.1).collect();
     let larger = small * 3;
     let best = finalists
         .par_iter()
-        .map(|&i| (judge(land, water, &candidates[i], larger), i))
+        .map(|&i| (judge(&ground, water, &candidates[i], larger), i))
         .reduce(|| (f64::NEG_INFINITY, usize::MAX), |a, b| if (b.0, a.1) > (a.0, b.1) { b } else { a });
     let Some(camera) = candidates.get(best.1) else { return overhead(land, water, size) };
     Shot {
@@ -156,7 +158,8 @@ fn ground_below(land: &Land, water: Option<&Water>, at: DVec2) -> Option<f64> {
 }
 
 /// How good a picture a camera takes: higher is better.
-fn judge(land: &Land, water: Option<&Water>, camera: &Camera, size: UVec2) -> f64 {
+fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -> f64 {
+    let land = &*ground.land;
     let view = camera.view(size);
     let (corner, right, down) = view.frame();
     let rays: Vec<LocalRay> = (0..size.x * size.y)
@@ -188,9 +191,10 @@ fn judge(land: &Land, water: Option<&Water>, camera: &Camera, size: UVec2) -> f6
         } else if distance.is_finite() {
             let at = view.eye + direction * distance;
             let Some(normal) = land.normal_at(at.truncate()) else { continue };
-            if normal.dot(ray.direction) > 0.0 {
-                // Seen from below: through a hole, or under the land's edge.
-                missing += 1.0;
+            let known = f64::from(ground.known(at.truncate()));
+            if known < 0.5 || normal.dot(ray.direction) > 0.0 {
+                // What is near and missing hurts; a rim of mist on the horizon does not.
+                missing += if distance < 0.5 * extent { 1.0 } else { 0.35 };
                 continue;
             }
             let shade = f64::from(normal.dot(sun).max(0.0));

@@ -105,7 +105,7 @@ impl Picture {
             Exposure::Automatic => self.grey(),
             Exposure::Grey(grey) => grey,
         };
-        let (contrast, colour) = if self.medium == Medium::Model { (1.15, 1.0) } else { (1.35, 1.40) };
+        let (contrast, colour) = if self.medium == Medium::Model { (1.15, 1.0) } else { (1.35, 1.28) };
         let scale = 0.30 / grey.max(1e-9) * how.compensation.exp2();
         self.radiance
             .par_iter()

@@ -35,12 +35,15 @@ const SCREE: Vec3 = Vec3::new(0.190, 0.170, 0.144);
 const SAND: Vec3 = Vec3::new(0.450, 0.372, 0.262);
 const MUD: Vec3 = Vec3::new(0.150, 0.122, 0.088);
 const SNOW: Vec3 = Vec3::new(0.860, 0.880, 0.910);
+const ROOF_TILES: Vec3 = Vec3::new(0.190, 0.085, 0.055);
+const ROOF_SLATE: Vec3 = Vec3::new(0.115, 0.112, 0.115);
+const PLASTER: Vec3 = Vec3::new(0.480, 0.445, 0.390);
 const SEAGRASS: Vec3 = Vec3::new(0.030, 0.042, 0.022);
 
 /// What kind of ground lies at `at` (m) on `surface`.
 ///
 /// `spacing` is the distance between samples (m), `footprint` the width of a pixel on the ground (m) and `water` the level of
-/// the water nearby (m), if any.
+/// the water nearby (m), if any; `standing` is the height of trees and houses that the samples include (m).
 pub fn natural(
     at: DVec3,
     surface: &Surface,
@@ -48,6 +51,7 @@ pub fn natural(
     footprint: f32,
     water: Option<f32>,
     climate: &Climate,
+    standing: f32,
 ) -> Material {
     let normal = Vec3::new(-surface.slope.x, -surface.slope.y, 1.0).normalize();
     let steep = surface.slope.length();
@@ -66,8 +70,8 @@ pub fn natural(
         if share == 0.0 {
             break;
         }
-        // Rock is layered: finer upward than along.
-        let layers = DVec3::new(1.0, 1.0, 1.0 + 1.3 * f64::from(rocky));
+        // Cliffs are layered, finer upward than along; on gentler ground layers would show as contour lines.
+        let layers = DVec3::new(1.0, 1.0, 0.35 + 1.7 * f64::from(step(0.9, 1.8, steep)));
         let noise = grain(at * layers / f64::from(wavelength), 100 + octave);
         relief += noise.gradient * layers.as_vec3() * (amplitude * share);
         bumps += noise.value * share;
@@ -96,8 +100,9 @@ pub fn natural(
     // Woods thin out with height, slope and near the sea.
     let mut openness = 1.0 + 0.25 * pits.min(0.0);
     let mut shaded = roughened;
-    let likes = 0.55 * wide + 0.75 * middle + 0.35 * moist - 0.9 * alpine - 0.5 * step(0.5, 0.8, steep) - 0.10;
-    let wood = step(0.0, 0.10, likes + 0.10 * fine) * step(5.0, 14.0, above) * (1.0 - rocky);
+    let likes = 0.50 * wide + 0.55 * middle + 0.45 * moist - 0.9 * alpine - 0.45 * step(0.5, 0.9, steep) - 0.02;
+    let clumps = 0.45 * patch(plain, 31.0, footprint, 4) + 0.35 * patch(plain, 14.0, footprint, 12) + 0.25 * fine;
+    let wood = step(-0.02, 0.22, likes + clumps) * step(5.0, 14.0, above) * (1.0 - 0.85 * rocky);
     if wood > 0.0 {
         let crown = resolved(7.0, footprint);
         let crowns = grain(at / 7.0, 8);
@@ -107,6 +112,10 @@ pub fn natural(
         albedo = albedo.lerp(WOODS * tone * (1.0 + 0.3 * wide), wood * 0.94);
         shaded = shaded.lerp(canopy, wood).normalize();
         openness *= 1.0 - wood * (0.22 - 0.35 * crown * crowns.value).clamp(0.0, 0.5);
+    }
+
+    if standing > 1.0 {
+        return stands(at, surface, spacing, footprint, standing, albedo, normal);
     }
 
     // Bare ground: high, steep or washed by the sea.
@@ -153,4 +162,35 @@ pub fn natural(
         openness += (1.0 - openness) * snow;
     }
     Material { albedo: albedo.clamp(Vec3::splat(0.01), Vec3::splat(0.92)), normal: shaded, openness, wet }
+}
+
+/// What stands on the ground: trees where the surface is rough, houses where it is even.
+fn stands(
+    at: DVec3,
+    surface: &Surface,
+    spacing: f32,
+    footprint: f32,
+    standing: f32,
+    ground: Vec3,
+    normal: Vec3,
+) -> Material {
+    let rough = step(0.10, 0.32, surface.hollow.abs() * spacing + 0.10 * (surface.slope.length() - 1.0).max(0.0));
+    let plain = DVec3::new(at.x, at.y, 0.0);
+    let leaves = grain(at / 1.7, 20);
+    let twigs = grain(at / 0.6, 21);
+    let (near, nearer) = (resolved(1.7, footprint), resolved(0.6, footprint));
+    let shaken = leaves.gradient * (0.6 * near) + twigs.gradient * (0.4 * nearer);
+    let tree = WOODS * (1.5 + 0.9 * patch(plain, 21.0, footprint, 22) + 0.5 * near * leaves.value + 0.5 * nearer * twigs.value);
+    let kind = patch(plain, 46.0, 0.1, 23) + 0.5 * patch(plain, 17.0, 0.1, 24);
+    let roof = ROOF_TILES.lerp(ROOF_SLATE, step(-0.02, 0.06, kind)) * (1.0 + 0.15 * patch(at, 2.0, footprint, 25));
+    let wall = step(1.3, 2.4, surface.slope.length());
+    let house = roof.lerp(PLASTER, wall);
+    let share = step(1.0, 2.2, standing);
+    let leafy = (normal - shaken * rough).normalize();
+    Material {
+        albedo: ground.lerp(house.lerp(tree, rough), share),
+        normal: normal.lerp(leafy, share).normalize(),
+        openness: 1.0 - 0.25 * rough * share * (0.5 - near * leaves.value).clamp(0.0, 1.0),
+        wet: 0.0,
+    }
 }

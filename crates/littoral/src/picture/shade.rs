@@ -83,6 +83,8 @@ struct Facet {
 struct Pool {
     ripples: Ripples,
     depth: f32,
+    /// How much of it is water at all, and not unknown.
+    open: f32,
     /// Light of the sky and of the unshaded sun that comes up through the surface, but for what that keeps.
     skylit: Vec3,
     sunlit: Vec3,
@@ -252,7 +254,8 @@ impl Stage<'_> {
             };
         }
         let water = self.scene.water.filter(|w| w.covers(at) || position.z < w.level + 15.0);
-        natural(position, surface, spacing, footprint, water.map(|w| w.level as f32), &self.scene.climate)
+        let level = water.map(|w| w.level as f32);
+        natural(position, surface, spacing, footprint, level, &self.scene.climate, self.ground.standing(at))
     }
 
     #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
@@ -299,7 +302,29 @@ impl Stage<'_> {
             shaded.sunlit = pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &pool.ripples) * film);
             shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
         }
+        if pool.open < 1.0 {
+            shaded.light = self.mist.lerp(shaded.light, pool.open);
+            shaded.sunlit *= pool.open;
+            shaded.mirror_share *= pool.open;
+        }
         shaded
+    }
+
+    /// How much of what lies at a place beyond the raster is sea, in [0, 1]: as much as of the border next to it.
+    fn open_sea(&self, at: DVec2) -> f32 {
+        let (low, high) = (self.scene.land.origin(), self.scene.land.origin() + self.scene.land.extent());
+        let border = at.clamp(low, high);
+        let away = (at - border).length();
+        let Some(water) = self.scene.water.filter(|_| away > 0.0) else { return 1.0 };
+        // The further out, the wider the stretch of border that counts; as far as the land is wide, all of it.
+        let along = (at - border).perp().normalize_or(DVec2::X);
+        let span = 0.25 * away + 2.0 * f64::from(self.ground.spacing());
+        let wet = (-4..=4).filter(|k| {
+            let place = (border + along * (f64::from(*k) * 0.25 * span)).clamp(low, high);
+            let ground = self.scene.land.height_at(place);
+            water.covers(place) && ground.is_some_and(|h| f64::from(h) <= water.level)
+        });
+        step(0.15, 0.85, wet.count() as f32 / 9.0)
     }
 
     /// The water at a place, as a pixel sees it.
@@ -333,6 +358,7 @@ impl Stage<'_> {
         Pool {
             ripples,
             depth,
+            open: self.open_sea(at),
             skylit: up(irradiance(&self.skylight.open, Vec3::Z) * 0.93),
             sunlit: up(self.air.sunlight(0.0) * (sun * (1.0 - fresnel(sun)))),
         }
