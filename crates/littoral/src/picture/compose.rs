@@ -41,7 +41,7 @@ pub fn compose(land: &Land, water: Option<&Water>, size: UVec2) -> Shot {
         return overhead(land, water, size);
     }
     let ground = Ground::new(land, water);
-    let candidates = candidates(land, water);
+    let candidates = candidates(land, water, ground.has_standing());
     let small = UVec2::new(24, (24 * size.y.max(1)).div_ceil(size.x.max(1)).clamp(8, 48));
     let mut judged: Vec<(f64, usize)> =
         candidates.par_iter().enumerate().map(|(i, c)| (judge(&ground, water, c, small), i)).collect();
@@ -114,7 +114,7 @@ impl Camera {
 }
 
 /// Eyes over a lattice of places within the land (and around it, where that is sea), at several heights.
-fn candidates(land: &Land, water: Option<&Water>) -> Vec<Camera> {
+fn candidates(land: &Land, water: Option<&Water>, standing: bool) -> Vec<Camera> {
     const PLACES: i32 = 9;
     const BEARINGS: usize = 12;
     let extent = land.extent();
@@ -129,13 +129,14 @@ fn candidates(land: &Land, water: Option<&Water>) -> Vec<Camera> {
         let f = DVec2::new(f64::from(i), f64::from(j)) / f64::from(PLACES);
         let at = land.origin() + extent * (0.02 + 0.96 * f);
         let Some(ground) = ground_below(land, water, at) else { continue };
-        for (k, share) in [0.035, 0.09, 0.18, 0.34].into_iter().enumerate() {
+        for (k, share) in [0.035f64, 0.09, 0.18, 0.34].into_iter().enumerate() {
             // Never nearer to the ground than a few samples, lest they be seen one by one.
+            let share = if standing { share.max(0.16) } else { share };
             let above = (share * reach).max(0.22 * relief * (k as f64 + 0.6)).max(5.0 * spacing);
             let eye = at.extend(ground + above);
             for b in 0..BEARINGS {
                 let bearing = TAU * b as f64 / BEARINGS as f64;
-                let tilt = -[6.0f64, 9.0, 15.0, 26.0][k].to_radians();
+                let tilt = -[6.0f64, 9.0, 15.0, 26.0][if standing { k.max(2) } else { k }].to_radians();
                 // Light from the side, over the shoulder that lies further south.
                 let sides = [bearing - 1.22, bearing + 1.22];
                 let sun_bearing = if sides[0].cos() <= sides[1].cos() { sides[0] } else { sides[1] };
@@ -194,7 +195,7 @@ fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -
             let known = f64::from(ground.known(at.truncate()));
             if known < 0.5 || normal.dot(ray.direction) > 0.0 {
                 // What is near and missing hurts; a rim of mist on the horizon does not.
-                missing += if distance < 0.5 * extent { 1.0 } else { 0.35 };
+                missing += if distance < 0.15 * extent { 4.0 } else if distance < 0.5 * extent { 1.0 } else { 0.35 };
                 continue;
             }
             let shade = f64::from(normal.dot(sun).max(0.0));

@@ -119,6 +119,11 @@ impl<'a> Ground<'a> {
         blend.max(0.6 * a.max(b).max(c).max(d) * f32::from(u8::from(blend > 0.3)))
     }
 
+    /// Whether the surface includes trees and houses.
+    pub fn has_standing(&self) -> bool {
+        !self.standing.is_empty()
+    }
+
     /// The level of the pyramid whose samples are about `footprint` (m) apart.
     pub fn level_of(&self, footprint: f32) -> usize {
         ((footprint / self.spacing()).max(1.0).log2().round() as usize).min(self.means.len())

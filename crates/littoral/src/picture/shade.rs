@@ -255,7 +255,8 @@ impl Stage<'_> {
         }
         let water = self.scene.water.filter(|w| w.covers(at) || position.z < w.level + 15.0);
         let level = water.map(|w| w.level as f32);
-        natural(position, surface, spacing, footprint, level, &self.scene.climate, self.ground.standing(at))
+        let broad = self.ground.surface(at, (4.0 * spacing).max(footprint));
+        natural(position, surface, &broad, spacing, footprint, level, &self.scene.climate, self.ground.standing(at))
     }
 
     #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
