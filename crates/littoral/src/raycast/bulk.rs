@@ -172,7 +172,15 @@ impl<T: Copy> Rays for Stream<'_, T> {
                 let index = self.order.map_or(index as i32, |order| order[index]);
                 let ray = &self.rays[index as usize];
                 id[lane] = index;
-                let from = [ray.origin.x, ray.origin.y, ray.origin.z, ray.direction.x, ray.direction.y, ray.direction.z, ray.reach];
+                let from = [
+                    ray.origin.x,
+                    ray.origin.y,
+                    ray.origin.z,
+                    ray.direction.x,
+                    ray.direction.y,
+                    ray.direction.z,
+                    ray.reach,
+                ];
                 for (number, from) in numbers.iter_mut().zip(from) {
                     number[lane] = from;
                 }

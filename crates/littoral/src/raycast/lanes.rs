@@ -170,7 +170,10 @@ impl Lanes for Portable {
 pub(super) use x86::{Avx2, Avx512};
 
 #[cfg(target_arch = "x86_64")]
-#[allow(clippy::undocumented_unsafe_blocks, reason = "every block but those of gathers has the same: a value of the type proves the features")]
+#[allow(
+    clippy::undocumented_unsafe_blocks,
+    reason = "every block but those of gathers has the same: a value of the type proves the features"
+)]
 mod x86 {
     use super::Lanes;
     use std::arch::x86_64::*;

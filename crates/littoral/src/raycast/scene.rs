@@ -45,7 +45,8 @@ impl<'a> Scene<'a> {
         }
         let side = 1i32 << land.finest_level();
         let position = (anchor.truncate() - land.origin()) / raster.spacing();
-        let cell = position.floor().clamp(glam::DVec2::splat(-f64::from(side)), glam::DVec2::splat(2.0 * f64::from(side)));
+        let cell =
+            position.floor().clamp(glam::DVec2::splat(-f64::from(side)), glam::DVec2::splat(2.0 * f64::from(side)));
         let (mut offsets, mut strides) = ([0; 16], [0; 16]);
         for (n, level) in ranges.levels.iter().enumerate().take(15) {
             (offsets[n + 1], strides[n + 1]) = (level.offset as i32, level.columns as i32);

@@ -92,7 +92,16 @@ impl Prepared {
     /// before which nothing can be met, `level` the level to begin with.
     #[inline(always)]
     pub fn set<L: Lanes>(
-        &mut self, l: L, scene: &Scene, at: usize, id: L::I, origin: [L::F; 3], direction: [L::F; 3], reach: L::F, from: L::F, level: L::I,
+        &mut self,
+        l: L,
+        scene: &Scene,
+        at: usize,
+        id: L::I,
+        origin: [L::F; 3],
+        direction: [L::F; 3],
+        reach: L::F,
+        from: L::F,
+        level: L::I,
     ) {
         let zero = l.splat(0.0);
         let infinity = l.splat(f32::INFINITY);
@@ -226,15 +235,44 @@ impl<L: Lanes> Packet<L> {
     fn empty(l: L) -> Packet<L> {
         let (f, i) = (l.splat(0.0), l.int(0));
         Packet {
-            id: i, x: f, y: f, z: f, dx: f, dy: f, dz: f, inverse_x: f, inverse_y: f, t: f, start: f, end: f, sign_x: i, sign_y: i,
-            mirror_x: i, mirror_y: i, base_x: i, base_y: i, last_x: i, last_y: i, cell_x: i, cell_y: i, level: l.int(-1), result: f,
+            id: i,
+            x: f,
+            y: f,
+            z: f,
+            dx: f,
+            dy: f,
+            dz: f,
+            inverse_x: f,
+            inverse_y: f,
+            t: f,
+            start: f,
+            end: f,
+            sign_x: i,
+            sign_y: i,
+            mirror_x: i,
+            mirror_y: i,
+            base_x: i,
+            base_y: i,
+            last_x: i,
+            last_y: i,
+            cell_x: i,
+            cell_y: i,
+            level: l.int(-1),
+            result: f,
             occupied: 0,
         }
     }
 
     /// Delivers the rays that are done and fills their lanes with new ones. Whether any lane is at work.
     #[inline(always)]
-    fn turn_over<R: Rays>(&mut self, l: L, scene: &Scene, rays: &mut R, block: &mut Prepared, cursor: &mut usize) -> bool {
+    fn turn_over<R: Rays>(
+        &mut self,
+        l: L,
+        scene: &Scene,
+        rays: &mut R,
+        block: &mut Prepared,
+        cursor: &mut usize,
+    ) -> bool {
         let all = (1u32 << L::COUNT) - 1;
         let done = l.bits(l.igt(l.int(0), self.level));
         if done.count_ones() * 16 < REFILL * L::COUNT as u32 {
@@ -247,7 +285,11 @@ impl<L: Lanes> Packet<L> {
             l.store(self.result, &mut results);
             while deliver != 0 {
                 let lane = deliver.trailing_zeros() as usize;
-                if results[lane] == BELOW { rays.below(ids[lane]) } else { rays.done(ids[lane], results[lane]) }
+                if results[lane] == BELOW {
+                    rays.below(ids[lane])
+                } else {
+                    rays.done(ids[lane], results[lane])
+                }
                 deliver &= deliver - 1;
             }
             self.occupied &= !done;
@@ -339,8 +381,9 @@ impl<L: Lanes> Packet<L> {
             let row = l.iselect(patches, row, zero);
             let here = l.iadd(l.imul(row, l.int(scene.columns)), column);
             // SAFETY: the patch exists, as above; it has a sample east, north and north-east of this one.
-            let ((a, b), (c, d)) =
-                unsafe { (l.gather_pair(scene.heights, here), l.gather_pair(scene.heights, l.iadd(here, l.int(scene.columns)))) };
+            let ((a, b), (c, d)) = unsafe {
+                (l.gather_pair(scene.heights, here), l.gather_pair(scene.heights, l.iadd(here, l.int(scene.columns))))
+            };
             let (u0, v0, u1, v1, f0, f1);
             let east = l.sub(b, a);
             let north = l.sub(c, a);
@@ -364,14 +407,14 @@ impl<L: Lanes> Packet<L> {
                 f0 = l.sub(z0, bilinear(u0, v0));
                 f1 = l.sub(z1, bilinear(u1, v1));
             } else {
-                let (from_x, from_y) = (l.float(l.isub(column, l.int(scene.cell[0]))), l.float(l.isub(row, l.int(scene.cell[1]))));
+                let (from_x, from_y) =
+                    (l.float(l.isub(column, l.int(scene.cell[0]))), l.float(l.isub(row, l.int(scene.cell[1]))));
                 u0 = l.sub(l.flip(l.add(self.x, l.mul(self.t, self.dx)), self.sign_x), from_x);
                 v0 = l.sub(l.flip(l.add(self.y, l.mul(self.t, self.dy)), self.sign_y), from_y);
                 u1 = l.sub(l.flip(l.add(self.x, l.mul(leave, self.dx)), self.sign_x), from_x);
                 v1 = l.sub(l.flip(l.add(self.y, l.mul(leave, self.dy)), self.sign_y), from_y);
-                let bilinear = |u: L::F, v: L::F| {
-                    l.add(l.add(a, l.mul(east, u)), l.mul(v, l.add(north, l.mul(twist, u))))
-                };
+                let bilinear =
+                    |u: L::F, v: L::F| l.add(l.add(a, l.mul(east, u)), l.mul(v, l.add(north, l.mul(twist, u))));
                 f0 = l.sub(z0, bilinear(u0, v0));
                 f1 = l.sub(z1, bilinear(u1, v1));
             }
