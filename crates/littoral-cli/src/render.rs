@@ -359,7 +359,7 @@ impl Render {
     fn shot(&self, subject: &Subject, built_in: bool, talk: &mut Talk) -> Result<(Framed, DVec3), Failure> {
         let (land, water) = (&subject.land, subject.water.as_ref());
         let chosen = match built_in {
-            true => picture::coast_shot(land, water, self.size),
+            true => picture::coast_shot(self.size),
             false => picture::compose(land, water, self.size),
         };
         let own_field = 2.0 * (0.5 * f64::from(self.size.y) / f64::from(chosen.view.pixels_per_radian)).atan();
