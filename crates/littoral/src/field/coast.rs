@@ -37,27 +37,22 @@ pub fn coast() -> Land {
 
 /// A good view of the coast.
 pub fn view(size: UVec2) -> View {
-    let eye = DVec3::new(1500.0, 380.0, 105.0);
-    View::looking_at(eye, DVec3::new(2450.0, 2600.0, 40.0), 42f32.to_radians(), size)
+    let eye = DVec3::new(1330.0, 640.0, 120.0);
+    View::looking_at(eye, DVec3::new(2900.0, 2250.0, 30.0), 36f32.to_radians(), size)
 }
 
 /// Bearing and elevation of the sun that suits [`view`] (rad).
 pub fn sun() -> (f64, f64) {
-    (262f64.to_radians(), 15f64.to_radians())
+    (284f64.to_radians(), 14f64.to_radians())
 }
 
 /// How far inland a place lies (m), by the outline drawn by hand, bent by noise; negative at sea.
 fn inland(at: DVec2) -> f64 {
-    let bend = |wavelength: f64, amount: f64, seed: u32| {
-        DVec2::new(
-            Fbm::new(wavelength, amount, 4, seed).at(at).value,
-            Fbm::new(wavelength, amount, 4, seed + 50).at(at).value,
-        )
-    };
-    let p = at + bend(900.0, 260.0, 11) + bend(260.0, 90.0, 12);
-    // The shore as the height of land over x: a headland in the west, a wide bay, a lesser cape in the east.
+    let bend = |seed: u32| Fbm::new(900.0, 300.0, 5, seed).at(at).value;
+    let p = at + DVec2::new(bend(11), bend(61));
+    // The shore as the height of land over x: a lesser cape in the west, a wide bay, a headland in the east.
     let bump = |middle: f64, width: f64| (-((p.x - middle) / width).powi(2)).exp();
-    let line = 2050.0 - 1150.0 * bump(900.0, 420.0) + 520.0 * bump(2350.0, 620.0) - 700.0 * bump(3900.0, 520.0) - 250.0 * bump(5200.0, 700.0);
+    let line = 2000.0 - 1150.0 * bump(3750.0, 430.0) + 560.0 * bump(2450.0, 600.0) - 620.0 * bump(1050.0, 480.0) - 150.0 * bump(5100.0, 700.0);
     p.y - line
 }
 
@@ -90,10 +85,10 @@ fn hills() -> Carving {
             .collect()
     };
     land.drain();
-    land.carve(&Law { rivers: 0.028, uplift: 7.0, creep: 40.0 }, &rises(land.side), 60);
+    land.carve(&Law { rivers: 0.030, uplift: 1.5, creep: 60.0 }, &rises(land.side), 60);
     for (steps, law) in [
-        (14, Law { rivers: 0.028, uplift: 7.0, creep: 22.0 }),
-        (6, Law { rivers: 0.022, uplift: 5.0, creep: 7.0 }),
+        (14, Law { rivers: 0.030, uplift: 1.5, creep: 25.0 }),
+        (6, Law { rivers: 0.022, uplift: 1.2, creep: 7.0 }),
     ] {
         land = land.finer();
         land.drain();
@@ -123,36 +118,55 @@ impl Shore {
 
     /// Height of the finished coast at a place (m).
     fn height(&self, at: DVec2) -> f64 {
-        // Rock breaks along the shore in steps of tens of metres.
-        let ragged = Fbm::new(120.0, 26.0, 4, 31).at(at).value;
         let raw = self.blend(&self.inland, at);
-        let d = raw + ragged * smooth(-300.0, 40.0, raw).min(1.0);
-        let hill = self.blend(&self.hills, at).max(0.0);
+        let carved = self.blend(&self.hills, at).max(0.0);
         let exposed = self.exposure(at);
-
-        // The bed: a beach's profile in the bay, a steeper rocky one in the open, uneven.
-        let off = (-d).max(0.0);
-        let sandy = 0.075 * off.powf(2.0 / 3.0) + 0.006 * off;
-        let rocky = 1.2 + 0.30 * off.powf(2.0 / 3.0) + 0.02 * off;
-        let uneven = Fbm::new(240.0, 7.0, 5, 33).at(at).value * exposed * smooth(0.0, 120.0, off);
-        let bed = -(sandy + (rocky - sandy) * exposed) + uneven.min(0.6 * rocky);
+        let off = (-raw).max(0.0);
+        if off > 420.0 {
+            return self.bed(at, off, exposed).max(self.skerries(at));
+        }
+        if raw > 420.0 {
+            let crags = Fbm::new(46.0, 5.0, 3, 35).at(at).value;
+            return self.lifted(at, carved, raw) + crags * smooth(20.0, 160.0, carved);
+        }
+        // Rock breaks along the shore in steps of tens of metres.
+        let ragged = Fbm::new(150.0, 44.0, 4, 31).at(at).value;
+        let d = raw + ragged * smooth(-200.0, 0.0, raw) * (0.25 + 0.75 * exposed);
+        let hill = self.lifted(at, carved, d);
+        let bed = self.bed(at, (-d).max(0.0), exposed);
 
         // A beach rises gently to its dunes; behind, the hills begin.
-        let dune = Fbm::new(70.0, 2.6, 3, 34).at(at).value;
-        let beach = 0.045 * d.max(0.0) + (1.5 + dune).max(0.0) * smooth(45.0, 110.0, d);
-        let gentle = beach + (hill - beach).max(0.0) * smooth(50.0, 260.0, d);
+        let dune = gradient(at / 70.0, 34).value * 2.6;
+        let beach = 0.045 * d.max(0.0) + (1.2 + dune).max(0.0) * smooth(40.0, 100.0, d);
+        let gentle = beach + (hill - beach).max(0.0) * smooth(60.0, 330.0, d);
 
-        // Waves have taken the foot of open hills: what is left ends in a cliff.
-        let retreat = 26.0 + 18.0 * exposed;
-        let face = smooth(retreat - 9.0, retreat + 11.0, d + 0.30 * ragged);
-        let rough = Fbm::new(42.0, 5.0, 4, 35).at(at).value;
-        let top = hill + rough * smooth(20.0, 120.0, hill) * 0.6 + rough * exposed * 0.4;
-        let platform = bed.max(-1.4 - 0.05 * (retreat - d).max(0.0)) + 1.2 * rough.max(-0.6) * exposed * smooth(90.0, 10.0, (d - 10.0).abs());
-        let cliff = platform + (top.max(6.0) - platform) * face;
+        // Waves have taken the foot of open hills: what is left ends in a cliff above a platform of rock.
+        let crags = Fbm::new(46.0, 5.0, 4, 35).at(at).value;
+        let retreat = 62.0 + 0.5 * ragged;
+        let face = smooth(retreat - 8.0, retreat + 12.0, d + crags);
+        let top = hill + crags * smooth(20.0, 120.0, hill) + 1.0;
+        let platform = (bed - 0.4).min(-0.6 - 0.02 * (retreat - d).max(0.0)) + 1.5 * crags.max(-0.8) * smooth(110.0, 50.0, (d - retreat).abs());
+        let cliff = platform + (top - platform) * face;
+        let open = if d > -200.0 { cliff } else { bed };
+        let sheltered = if d > 0.0 { gentle.min(hill.max(beach)) } else { bed };
+        (sheltered + (open - sheltered) * exposed).max(self.skerries(at))
+    }
 
-        let height = gentle.min(hill.max(beach)) * (1.0 - exposed) + cliff * exposed;
-        let shore = if d > 0.0 { height } else { bed * (1.0 - exposed) + platform.min(bed + 6.0) * exposed };
-        shore.max(self.skerries(at))
+    /// The carved hills, with open headlands lifted clear of the sea.
+    fn lifted(&self, at: DVec2, carved: f64, d: f64) -> f64 {
+        let headland = (-((at.x - 3700.0) / 620.0).powi(2)).exp() * smooth(2600.0, 1300.0, at.y);
+        let cape = 0.55 * (-((at.x - 1100.0) / 520.0).powi(2)).exp() * smooth(2500.0, 1500.0, at.y);
+        let uneven = 1.0 + 0.7 * gradient(at / 420.0, 42).value;
+        carved + 62.0 * headland.max(cape).max(0.18) * uneven * smooth(-20.0, 60.0, d) * smooth(1500.0, 400.0, d)
+    }
+
+    /// The bed: a beach's profile in the bay, a steeper rocky one in the open, uneven.
+    fn bed(&self, at: DVec2, off: f64, exposed: f64) -> f64 {
+        let root = off.cbrt();
+        let sandy = 0.075 * root * root + 0.006 * off;
+        let rocky = 1.0 + 0.26 * root * root + 0.018 * off;
+        let uneven = Fbm::new(240.0, 7.0, 4, 33).at(at).value * exposed * smooth(0.0, 120.0, off);
+        -(sandy + (rocky - sandy) * exposed) + uneven.min(0.6 * rocky)
     }
 
     /// How open a place lies to the waves, in [0, 1]: the bay is sheltered.
@@ -164,7 +178,7 @@ impl Shore {
 
     /// Rocks off the headland.
     fn skerries(&self, at: DVec2) -> f64 {
-        let rocks = [(690.0, 420.0, 62.0, 15.0), (840.0, 330.0, 36.0, 8.0), (1215.0, 560.0, 30.0, 6.0), (3480.0, 1010.0, 48.0, 11.0)];
+        let rocks = [(3330.0, 640.0, 62.0, 17.0), (3190.0, 560.0, 36.0, 8.0), (3560.0, 520.0, 30.0, 6.0), (1790.0, 1010.0, 40.0, 9.0)];
         let mut best = f64::NEG_INFINITY;
         for (i, (x, y, radius, height)) in rocks.into_iter().enumerate() {
             let away = at - DVec2::new(x, y);
@@ -172,7 +186,7 @@ impl Shore {
                 let bend = Fbm::new(55.0, 26.0, 4, 60 + i as u32).at(at).value;
                 let r = (away.length() + bend) / radius;
                 let crag = Fbm::new(24.0, 5.0, 4, 70 + i as u32).at(at).value;
-                best = best.max((height + crag) * smooth(1.15, 0.55, r) - 14.0 * smooth(0.7, 3.5, r) - 3.0 * smooth(0.8, 1.2, r));
+                best = best.max((height + crag) * smooth(1.15, 0.55, r) - 60.0 * smooth(0.7, 6.0, r) - 3.0 * smooth(0.8, 1.2, r));
             }
         }
         best

@@ -85,23 +85,17 @@ impl Picture {
             Exposure::Automatic => self.grey(),
             Exposure::Grey(grey) => grey,
         };
-        let scale = 0.18 / grey.max(1e-9) * how.compensation.exp2();
+        let scale = 0.21 / grey.max(1e-9) * how.compensation.exp2();
         self.radiance
             .par_iter()
             .map(|p| {
-                let shown = film(DAYLIGHT_BALANCE * Vec3::from(*p) * scale);
+                let shown = film(Vec3::from(*p) * scale);
                 // What lies between two steps of the screen is rounded; skies are graded finely enough by sampling noise.
                 shown.to_array().map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
             })
             .collect()
     }
 }
-
-/// White balance for daylight: von Kries's scaling from the white of D55 to that of D65, in linear Rec. 709 (cones after
-/// Bradford).
-const DAYLIGHT_BALANCE: Mat3 = Mat3::from_cols_array(&[
-    0.943_6, -0.001_6, 0.003_4, -0.018_7, 1.003_4, -0.014_2, 0.004_0, 0.003_1, 1.180_0,
-]);
 
 /// Film: linear light to display values in [0, 1] (already encoded for the screen). T. Sobotka's AgX, in B. Wrensch's polynomial form
 /// (2023): colours lose saturation as they brighten, as on film, and nothing clips. The look on top is a little more

@@ -85,11 +85,6 @@ impl<'a> Ground<'a> {
         (south + (north - south) * f.y) * (1.0 / 255.0)
     }
 
-    /// Whether any ground is missing.
-    pub fn has_mist(&self) -> bool {
-        !self.known.is_empty()
-    }
-
     /// The smooth surface about a world position (m), averaged over `footprint` (m). Beyond the border: that of the border.
     pub fn surface(&self, at: DVec2, footprint: f32) -> Surface {
         let level = (footprint / self.spacing()).max(1.0).log2().min(self.means.len() as f32);
@@ -106,10 +101,14 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// The mean height about a world position (m) over about `footprint` (m): one bilinear read of the nearest level.
-    pub fn mean(&self, at: DVec2, footprint: f32) -> f32 {
-        let level = (footprint / self.spacing()).max(1.0).log2().round() as usize;
-        let (heights, columns, rows, spacing) = self.level(level.min(self.means.len()));
+    /// The level of the pyramid whose samples are about `footprint` (m) apart.
+    pub fn level_of(&self, footprint: f32) -> usize {
+        ((footprint / self.spacing()).max(1.0).log2().round() as usize).min(self.means.len())
+    }
+
+    /// The mean height about a world position (m) on a [level](Ground::level_of) of the pyramid: one bilinear read.
+    pub fn mean(&self, at: DVec2, level: usize) -> f32 {
+        let (heights, columns, rows, spacing) = self.level(level);
         let p = ((at - self.land.origin()) / spacing).as_vec2();
         let p = p.clamp(Vec2::ZERO, Vec2::new((columns - 1) as f32, (rows - 1) as f32));
         let (i, j) = ((p.x as usize).min(columns - 2), (p.y as usize).min(rows - 2));
@@ -385,7 +384,7 @@ mod tests {
         let land = plane(65, 49, |x, y| 0.3 * x - 0.7 * y - 500.0);
         let sea = Water::flood(&land, 1e4).expect("all under water");
         let ground = Ground::new(&land, Some(&sea));
-        assert!(!ground.has_mist());
+        assert!(ground.known.is_empty());
         for footprint in [0.1, 3.0, 7.5, 11.0] {
             let s = ground.surface(DVec2::new(61.3, 70.1), footprint);
             assert!((s.slope - Vec2::new(0.3, -0.7)).length() < 1e-3, "{footprint}: {}", s.slope);

@@ -18,7 +18,7 @@ const DIRECTIONS: usize = 16;
 /// Steps of elevation in the tables, from straight down to straight up.
 const STEPS: usize = 96;
 /// Most grid points along a side.
-const MOST: usize = 448;
+const MOST: usize = 320;
 
 /// Light arriving from all sides: nine spherical harmonics of radiance (kcd/m²), ready for [`irradiance`].
 pub type Light = [Vec3; 9];
@@ -56,8 +56,12 @@ impl Skylight {
         let rows = (land.extent().y / step.y).ceil() as usize + 1;
         let origin = land.origin();
         let place = |i: usize| origin + step * DVec2::new((i % columns) as f64, (i / columns) as f64);
-        let horizons: Vec<Horizon> =
-            (0..columns * rows).into_par_iter().map(|i| horizon(ground, place(i), step.min_element() as f32, sun)).collect();
+        let (around, towards) = (Steps::new(ground, 1.0, 1.55), Steps::new(ground, 1.5, 1.22));
+        let fineness = step.min_element() as f32;
+        let horizons: Vec<Horizon> = (0..columns * rows)
+            .into_par_iter()
+            .map(|i| horizon(ground, place(i), fineness, sun, &around, &towards))
+            .collect();
         let tables = Tables::new(sky);
         let open = tables.open(albedo, air.sunlight(0.0) * sun.z.max(0.0));
         let sky_up = tables.sky_up;
@@ -123,30 +127,36 @@ fn direction(k: usize) -> Vec2 {
     Vec2::new(c, s)
 }
 
-fn horizon(ground: &Ground, at: DVec2, step: f32, sun: Vec3) -> Horizon {
-    let surface = ground.surface(at, step);
-    let start = ground.spacing();
-    let reach = ground.land.extent().length() as f32;
+/// How far a march looks, step by step: distance (m) and the level of the pyramid to look at.
+struct Steps(Vec<(f32, usize)>);
+
+impl Steps {
+    fn new(ground: &Ground, start: f32, growth: f32) -> Steps {
+        let reach = ground.land.extent().length() as f32;
+        let first = start * ground.spacing();
+        let distances = std::iter::successors(Some(first), |t| Some(t * growth)).take_while(|t| *t < reach);
+        Steps(distances.map(|t| (t, ground.level_of(0.35 * t))).collect())
+    }
+}
+
+fn horizon(ground: &Ground, at: DVec2, fineness: f32, sun: Vec3, around: &Steps, towards: &Steps) -> Horizon {
+    let surface = ground.surface(at, fineness);
     // The greatest tangent of elevation along a direction, and where.
-    let march = |along: Vec2, from: f32, growth: f32| {
-        let (mut tangent, mut place) = (surface.slope.dot(along), start);
-        let mut t = from;
-        while t < reach {
-            let h = ground.mean(at + along.as_dvec2() * f64::from(t), 0.3 * t);
-            let rise = (h - surface.height) / t;
+    let march = |along: Vec2, steps: &Steps| {
+        let (mut tangent, mut place) = (surface.slope.dot(along), ground.spacing());
+        for &(t, level) in &steps.0 {
+            let rise = (ground.mean(at + along.as_dvec2() * f64::from(t), level) - surface.height) / t;
             if rise > tangent {
                 (tangent, place) = (rise, t);
             }
-            t *= growth;
         }
         (tangent, place)
     };
     let ring = std::array::from_fn(|k| {
-        let (tangent, place) = march(direction(k), start, 1.42);
+        let (tangent, place) = march(direction(k), around);
         (elevation_step(tangent.atan()), place)
     });
-    let along = sun.truncate().normalize_or(Vec2::X);
-    let (tangent, _) = march(along, 1.5 * start.max(0.5 * step), 1.12);
+    let (tangent, _) = march(sun.truncate().normalize_or(Vec2::X), towards);
     let elevation = sun.z.clamp(-1.0, 1.0).asin();
     let sunny = ((elevation - tangent.atan()) / 0.03 + 0.5).clamp(0.0, 1.0);
     let normal = Vec3::new(-surface.slope.x, -surface.slope.y, 1.0).normalize();
