@@ -6,12 +6,20 @@
 
 mod bulk;
 mod lanes;
+mod profile;
 mod scene;
+mod section;
+mod sight;
+mod slope;
 mod stream;
+mod viewshed;
 mod walk;
 
 pub use bulk::{RayCaster, Simd};
+pub use profile::{ProfilePoint, ProfilePoints, ProfileSummary};
+pub use sight::{Curvature, GRAZE, Obstacle, Sight, SightError, Station};
 pub use stream::LocalRay;
+pub use viewshed::{Viewshed, ViewshedCount};
 
 use crate::field::Land;
 use crate::space::Ray;
