@@ -247,7 +247,7 @@ fn saved(subject: &Subject, path: &FlightPath) -> SavedPath {
     };
     let decimals = subject.frame.decimals();
     let place = |spot: &mut Spot| {
-        spot.xy = subject.frame.crs_from(spot.xy);
+        spot.xy = subject.frame.crs(spot.xy);
         spot.xy = DVec2::new(round(spot.xy.x, decimals), round(spot.xy.y, decimals));
         match &mut spot.level {
             Level::AboveGround(z) | Level::Absolute(z) => *z = round(*z / subject.exaggeration, 2),

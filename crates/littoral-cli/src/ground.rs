@@ -1,9 +1,9 @@
 //! A height file as ground to stand on, in the file's coordinates and in local metres.
 
-use crate::talk::{Failure, Talk};
+use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DAffine2, DVec2};
 use littoral::field::{Land, Raster, Window};
-use littoral_data::{Crs, Info, Source, VerticalDatum};
+use littoral_data::{Crs, Dem, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
 use std::path::{Path, PathBuf};
 
 /// An opened height file.
@@ -15,15 +15,13 @@ pub struct Opened {
     source: Box<dyn Source>,
 }
 
-/// How a file's samples, its coordinates and local metres belong together.
+/// How a file's coordinates and local metres belong together.
 #[derive(Clone, Debug)]
 pub struct Frame {
+    georeference: Georeference,
     local_from_sample: DAffine2,
-    crs_from_sample: DAffine2,
-    crs: Crs,
-    last: DVec2,
-    /// Whether the file's rows run against the land's.
-    north_first: bool,
+    crs_from_local: DAffine2,
+    local_from_crs: DAffine2,
 }
 
 /// Coordinates as typed.
@@ -46,11 +44,18 @@ impl Opened {
     /// Opens a file and passes on what its reader noticed.
     pub fn open(file: &Path, talk: &mut Talk) -> Result<Opened, Failure> {
         let source = littoral_data::open(file)?;
-        let frame = Frame::of(source.info());
-        for warning in &source.info().warnings {
-            talk.warn(format!("{}: {warning}", file.display()));
+        let info = source.info();
+        let opened = Opened { file: file.to_owned(), frame: Frame::of(&info.georeference), source };
+        opened.pass_on(&opened.info().warnings.clone(), talk);
+        opened.pass_on(&opened.info().georeference.warnings(), talk);
+        Ok(opened)
+    }
+
+    /// Warns of what came up since.
+    fn pass_on(&self, warnings: &[String], talk: &mut Talk) {
+        for warning in warnings {
+            talk.warn(format!("{}: {warning}", self.file.display()));
         }
-        Ok(Opened { file: file.to_owned(), frame, source })
     }
 
     /// What the file is.
@@ -63,49 +68,66 @@ impl Opened {
         self.source.levels()
     }
 
-    /// Rows of the blocks in which the file is stored: windows along their borders read cheapest.
-    pub fn block_rows(&self) -> usize {
-        self.source.block(0)[1].max(1)
-    }
-
-    /// Heights of a window at full resolution, in the file's order.
-    pub fn read(&mut self, window: Window) -> Result<Vec<f32>, Failure> {
-        Ok(self.source.read(0, window)?)
+    /// What reading every sample tells.
+    pub fn survey(&mut self, talk: &mut Talk) -> Result<Survey, Failure> {
+        let bar = progress(1000, "reading");
+        let survey = littoral_data::survey(&mut *self.source, &|done| bar.set_position((done * 1000.0) as u64))?;
+        bar.finish_and_clear();
+        self.pass_on(&self.info().warnings.clone(), talk);
+        Ok(survey)
     }
 
     /// The whole file as land, at full resolution.
-    pub fn whole(&mut self) -> Result<Land, Failure> {
+    pub fn whole(&mut self, talk: &mut Talk) -> Result<Land, Failure> {
         let (columns, rows) = (self.info().columns, self.info().rows);
-        self.part(Window { column: 0, row: 0, columns, rows })
+        self.part(Window { column: 0, row: 0, columns, rows }, talk)
     }
 
-    /// A window of the file as land, at full resolution, in the local metres of the whole file.
-    pub fn part(&mut self, window: Window) -> Result<Land, Failure> {
-        let mut heights = self.read(window)?;
-        if self.frame.north_first {
-            for row in 0..window.rows / 2 {
-                let (upper, lower) = heights.split_at_mut((window.rows - 1 - row) * window.columns);
-                upper[row * window.columns..(row + 1) * window.columns].swap_with_slice(&mut lower[..window.columns]);
+    /// A window of the file as land, at full resolution, in the local metres of the whole file. It may be all void.
+    pub fn part(&mut self, window: Window, talk: &mut Talk) -> Result<Land, Failure> {
+        let Window { columns, rows, .. } = window;
+        let mut heights = self.source.read(0, window)?;
+        self.pass_on(&self.info().warnings.clone(), talk);
+        let [flip_columns, flip_rows] = self.frame.georeference.flips();
+        if flip_rows {
+            for row in 0..rows / 2 {
+                let (upper, lower) = heights.split_at_mut((rows - 1 - row) * columns);
+                upper[row * columns..(row + 1) * columns].swap_with_slice(&mut lower[..columns]);
             }
         }
-        let spacing = self.frame.spacing();
+        if flip_columns {
+            heights.chunks_exact_mut(columns).for_each(<[f32]>::reverse);
+        }
         let raster =
-            Raster::new(window.columns, window.rows, spacing, heights).map_err(|e| self.failure(&e.to_string()))?;
-        let first_row = if self.frame.north_first { window.row + window.rows - 1 } else { window.row };
-        let corner = DVec2::new(window.column as f64, first_row as f64);
-        Ok(Land::at(raster, self.frame.local_from_sample.transform_point2(corner)))
+            Raster::new(columns, rows, self.frame.spacing(), heights).map_err(|e| self.failure(&e.to_string()))?;
+        let column = if flip_columns { window.column + columns - 1 } else { window.column };
+        let row = if flip_rows { window.row + rows - 1 } else { window.row };
+        let corner = self.frame.local_from_sample.transform_point2(DVec2::new(column as f64, row as f64));
+        Ok(Land::at(raster, corner))
+    }
+
+    /// The file as land at a resolution of at most so many samples, and the frame of that.
+    pub fn fitting(&mut self, most_samples: usize, talk: &mut Talk) -> Result<(Land, Frame), Failure> {
+        let bar = progress(1000, "reading");
+        let told = |done: f32| bar.set_position((done * 1000.0) as u64);
+        let dem = littoral_data::load_from(&mut *self.source, &self.file, LoadOptions { most_samples }, &told)?;
+        bar.finish_and_clear();
+        self.pass_on(&dem.info.warnings, talk);
+        let Dem { raster, georeference, .. } = dem;
+        Ok((Land::new(raster), Frame::of(&georeference)))
     }
 
     /// The smallest window whose patches hold all the local positions, with a sample to spare; at least 2 × 2.
     pub fn window_of(&self, positions: impl IntoIterator<Item = DVec2>) -> Window {
         let samples = self.frame.local_from_sample.inverse();
-        let (mut low, mut high) = (self.frame.last, DVec2::ZERO);
+        let last = self.frame.last();
+        let (mut low, mut high) = (last, DVec2::ZERO);
         for position in positions {
             let sample = samples.transform_point2(position);
             (low, high) = (low.min(sample), high.max(sample));
         }
-        let low = (low.floor() - 1.0).clamp(DVec2::ZERO, self.frame.last - 1.0);
-        let high = (high.ceil() + 1.0).clamp(low + 1.0, self.frame.last);
+        let low = (low.floor() - 1.0).clamp(DVec2::ZERO, last - 1.0);
+        let high = (high.ceil() + 1.0).max(low + 1.0).min(last);
         let size = high - low + 1.0;
         Window { column: low.x as usize, row: low.y as usize, columns: size.x as usize, rows: size.y as usize }
     }
@@ -115,13 +137,20 @@ impl Opened {
         Failure::Work(format!("{}: {problem}", self.file.display()))
     }
 
-    /// Says that positions lie outside, in a way that helps to find the mistake.
+    /// Local metres of typed coordinates.
+    pub fn local(&self, system: System, at: DVec2) -> Result<DVec2, Failure> {
+        self.frame.local(system, at).map_err(|e| self.failure(&e))
+    }
+
+    /// Says that a position lies outside, in a way that helps to find the mistake.
     pub fn outside(&self, system: System, at: DVec2) -> String {
         let (low, high) = self.frame.bounds();
         let degrees = at.x.abs() <= 360.0 && at.y.abs() <= 90.0;
-        let advice = match (&self.frame.crs, system) {
+        let within = |p: DVec2| p.cmpge(low).all() && p.cmple(high).all();
+        let advice = match (&self.info().georeference.crs, system) {
+            (_, System::File) if within(DVec2::new(at.y, at.x)) => "swap X and Y",
             (Crs::Projected { .. }, System::File) if degrees => "if these are degrees, add --lonlat",
-            (_, System::File) if low.y <= at.x && at.x <= high.y && low.x <= at.y && at.y <= high.x => "swap X and Y",
+            (Crs::Projected { .. }, System::LonLat) if !degrees => "leave out --lonlat",
             _ => "choose one within",
         };
         format!(
@@ -137,124 +166,95 @@ impl Opened {
 
     /// What the heights are counted from, in words.
     pub fn datum(&self) -> String {
-        datum(&self.info().vertical_datum)
-    }
-}
-
-/// What heights are counted from, in words.
-pub fn datum(datum: &VerticalDatum) -> String {
-    match datum {
-        VerticalDatum::Unknown => "heights taken as above sea level (the file does not say)".to_owned(),
-        VerticalDatum::Named(name) => format!("heights above {name}"),
+        match &self.info().vertical_datum {
+            VerticalDatum::Unknown => "heights taken as above sea level (the file does not say)".to_owned(),
+            VerticalDatum::Named(name) => format!("heights above {name}"),
+        }
     }
 }
 
 impl Frame {
-    /// The frame of a file.
-    pub fn of(info: &Info) -> Frame {
-        let georeference = &info.georeference;
-        let crs_from_sample = georeference.crs_from_sample();
-        let last = DVec2::new((info.columns - 1) as f64, (info.rows - 1) as f64);
-        let (x, y) = (crs_from_sample.matrix2.x_axis, crs_from_sample.matrix2.y_axis);
-        let scale = match &georeference.crs {
-            Crs::Unknown => DVec2::ONE,
-            Crs::Projected { metres, .. } => DVec2::splat(*metres),
-            Crs::Geographic { .. } => metres_per_degree(crs_from_sample.transform_point2(0.5 * last).y),
-        };
-        let spacing = DVec2::new((x * scale).length(), (y * scale).length());
-        // A file without a place of its own shows its first row in the north, as pictures do.
-        let north_first =
-            x.perp_dot(y) < 0.0 || georeference.crs == Crs::Unknown && georeference.geotransform[5] == 1.0;
-        let step = if north_first { DVec2::new(spacing.x, -spacing.y) } else { spacing };
-        let local_from_sample = DAffine2::from_scale_angle_translation(step, 0.0, -0.5 * last * step);
-        Frame { local_from_sample, crs_from_sample, crs: georeference.crs.clone(), last, north_first }
-    }
-
-    /// The frame of land that is given in metres alone.
-    pub fn local() -> Frame {
+    /// The frame of a raster.
+    pub fn of(georeference: &Georeference) -> Frame {
         Frame {
-            local_from_sample: DAffine2::IDENTITY,
-            crs_from_sample: DAffine2::IDENTITY,
-            crs: Crs::Unknown,
-            last: DVec2::ONE,
-            north_first: false,
+            local_from_sample: georeference.local_from_sample(),
+            crs_from_local: georeference.crs_from_local(),
+            local_from_crs: georeference.local_from_crs(),
+            georeference: georeference.clone(),
         }
     }
 
-    /// Whether the file's first row is the northern one, against the land's order.
-    pub fn north_first(&self) -> bool {
-        self.north_first
+    /// The frame of land that is given in metres alone.
+    pub fn metres() -> Frame {
+        Frame {
+            georeference: Georeference::none(2, 2),
+            local_from_sample: DAffine2::IDENTITY,
+            crs_from_local: DAffine2::IDENTITY,
+            local_from_crs: DAffine2::IDENTITY,
+        }
+    }
+
+    fn last(&self) -> DVec2 {
+        let [columns, rows] = self.georeference.size;
+        DVec2::new(columns as f64 - 1.0, rows as f64 - 1.0)
+    }
+
+    /// Where everything lies.
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
     }
 
     /// Distance between samples (m).
     pub fn spacing(&self) -> DVec2 {
-        DVec2::new(self.local_from_sample.matrix2.x_axis.x, self.local_from_sample.matrix2.y_axis.y.abs())
+        self.georeference.spacing()
     }
 
     /// Local metres of coordinates.
-    pub fn local_from(&self, system: System, at: DVec2) -> Result<DVec2, String> {
-        if system == System::LonLat && !matches!(self.crs, Crs::Geographic { .. }) {
-            return Err(
-                "expected a file in degrees for --lonlat, got one in another system; give its own coordinates".into()
-            );
-        }
-        let sample = self.crs_from_sample.inverse();
-        let mut at = sample.transform_point2(at);
-        if let Crs::Geographic { .. } = self.crs {
-            // Longitudes of -180 to 180 and of 0 to 360 mean the same places.
-            let turn = sample.transform_vector2(DVec2::new(360.0, 0.0));
-            for other in [at + turn, at - turn] {
-                let inside = |p: DVec2| p.x >= -0.5 && p.x <= self.last.x + 0.5;
-                if !inside(at) && inside(other) {
-                    at = other;
-                }
-            }
-        }
-        Ok(self.local_from_sample.transform_point2(at))
+    pub fn local(&self, system: System, at: DVec2) -> Result<DVec2, String> {
+        let crs = match system {
+            System::File => self.georeference.near(at),
+            System::LonLat => self.georeference.crs_from_lonlat(at)?,
+        };
+        Ok(self.local_from_crs.transform_point2(crs))
     }
 
     /// The file's coordinates of local metres.
-    pub fn crs_from(&self, local: DVec2) -> DVec2 {
-        (self.crs_from_sample * self.local_from_sample.inverse()).transform_point2(local)
+    pub fn crs(&self, local: DVec2) -> DVec2 {
+        self.crs_from_local.transform_point2(local)
     }
 
-    /// Whether a local position lies within the samples.
+    /// Whether a local position lies within the samples, but for rounding.
     pub fn holds(&self, local: DVec2) -> bool {
         let sample = self.local_from_sample.inverse().transform_point2(local);
-        sample.cmpge(DVec2::splat(-1e-6)).all() && sample.cmple(self.last + 1e-6).all()
+        sample.cmpge(DVec2::splat(-1e-6)).all() && sample.cmple(self.last() + 1e-6).all()
     }
 
     /// The lowest and highest coordinates of samples.
     pub fn bounds(&self) -> (DVec2, DVec2) {
-        let corners = [DVec2::ZERO, DVec2::new(self.last.x, 0.0), DVec2::new(0.0, self.last.y), self.last];
-        let corners = corners.map(|corner| self.crs_from_sample.transform_point2(corner));
+        let (last, crs) = (self.last(), self.georeference.crs_from_sample());
+        let corners = [DVec2::ZERO, DVec2::new(last.x, 0.0), DVec2::new(0.0, last.y), last];
+        let corners = corners.map(|corner| crs.transform_point2(corner));
         (corners.into_iter().fold(corners[0], DVec2::min), corners.into_iter().fold(corners[0], DVec2::max))
     }
 
-    /// A coordinate as it is worth showing: to a centimetre or so.
+    /// A coordinate as it is worth showing.
     pub fn shown(&self, coordinate: f64) -> String {
-        crate::talk::tidy(coordinate, self.decimals())
+        tidy(coordinate, self.decimals())
     }
 
-    /// Decimals that make a coordinate good to a centimetre or better.
+    /// Decimals that make a coordinate good to a centimetre or so.
     pub fn decimals(&self) -> usize {
-        if matches!(self.crs, Crs::Geographic { .. }) { 7 } else { 2 }
+        if matches!(self.georeference.crs, Crs::Geographic { .. }) { 7 } else { 2 }
     }
 
-    /// The coordinate system.
-    pub fn crs(&self) -> &Crs {
-        &self.crs
-    }
-
-    /// The latitude of the middle (degrees), where known.
+    /// The latitude of the middle (degrees), where it can be known.
     pub fn latitude(&self) -> Option<f64> {
-        matches!(self.crs, Crs::Geographic { .. }).then(|| self.crs_from_sample.transform_point2(0.5 * self.last).y)
+        self.georeference.lonlat_from_crs(self.georeference.middle()).ok().map(|lonlat| lonlat.y)
     }
 
-    /// The angle from the land's y axis clockwise to north (rad).
+    /// The angle from the land's y axis clockwise to true north (rad).
     pub fn north(&self) -> f64 {
-        let north = (self.local_from_sample * self.crs_from_sample.inverse()).transform_vector2(DVec2::Y);
-        if self.crs == Crs::Unknown { 0.0 } else { north.x.atan2(north.y) }
+        -self.georeference.true_north()
     }
 }
 
@@ -281,15 +281,4 @@ pub fn height_at(land: &Land, local: DVec2) -> Option<f32> {
         }
     }
     Some(height as f32)
-}
-
-/// Metres in a degree of longitude and of latitude on WGS 84 at a latitude (degrees).
-fn metres_per_degree(latitude: f64) -> DVec2 {
-    const A: f64 = 6_378_137.0;
-    const E2: f64 = 0.006_694_379_990_141_317;
-    let (sin, cos) = latitude.to_radians().sin_cos();
-    let w = 1.0 - E2 * sin * sin;
-    let prime_vertical = A / w.sqrt();
-    let meridian = prime_vertical * (1.0 - E2) / w;
-    DVec2::new(prime_vertical * cos.max(1e-3), meridian) * 1f64.to_radians()
 }

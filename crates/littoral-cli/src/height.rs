@@ -83,9 +83,9 @@ impl Height {
             None => {
                 // Few points: only the samples round them are read.
                 for point in &self.at {
-                    let local = opened.frame.local_from(system, point.xy).map_err(|e| opened.failure(&e))?;
+                    let local = opened.local(system, point.xy)?;
                     let window = opened.window_of([local]);
-                    let land = opened.part(window)?;
+                    let land = opened.part(window, talk)?;
                     let found = self.find(&land, local);
                     misses.count(&opened, point.xy, local, &found);
                     self.say(talk, &point.text, found, &mut answer)?;
@@ -132,11 +132,11 @@ impl Height {
         points: &Path,
         opened: &mut Opened,
         system: System,
-        talk: &Talk,
+        talk: &mut Talk,
         misses: &mut Misses,
         answer: &mut Answer,
     ) -> Result<(), Failure> {
-        let land = opened.whole()?;
+        let land = opened.whole(talk)?;
         let name = if points == Path::new("-") { "standard input".to_owned() } else { points.display().to_string() };
         let reader: Box<dyn Read> = match points == Path::new("-") {
             true => Box::new(std::io::stdin().lock()),
@@ -159,8 +159,7 @@ impl Height {
                 let Some(xy) = point(text).map_err(|got| at_line(&name, lines_before + number, got))? else {
                     return Ok(None);
                 };
-                let local =
-                    opened.frame.local_from(system, xy).map_err(|e| format!("{}: {e}", opened.file.display()))?;
+                let local = opened.frame.local(system, xy).map_err(|e| format!("{}: {e}", opened.file.display()))?;
                 Ok(Some((xy, local, self.find(&land, local))))
             };
             let looked: Vec<Looked> = lines.par_iter().enumerate().with_min_len(256).map(look).collect();

@@ -1,9 +1,8 @@
 //! `littoral info`: what a file is, and what is assumed about it.
 
 use crate::ground::Opened;
-use crate::talk::{Failure, Talk, progress, tidy};
-use littoral::field::{HeightRange, Window};
-use littoral_data::{Crs, Info as FileInfo, Registration, VerticalDatum};
+use crate::talk::{Failure, Talk, tidy};
+use littoral_data::{Crs, Registration, VerticalDatum, name_of_unit};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -26,7 +25,7 @@ struct Answer<'a> {
     format: &'a str,
     width: usize,
     height: usize,
-    void: usize,
+    void: u64,
     nodata: Option<f64>,
     min: Option<f32>,
     max: Option<f32>,
@@ -44,44 +43,30 @@ struct Answer<'a> {
     overviews: Vec<[usize; 2]>,
 }
 
-/// What only reading every sample tells.
-struct Survey {
-    range: HeightRange,
-    void: usize,
-    first: Option<f32>,
-    centre: Option<f32>,
-    last: Option<f32>,
-}
-
 impl Info {
     /// Runs the command.
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
         let mut opened = Opened::open(&self.file, talk)?;
-        let survey = survey(&mut opened)?;
-        // Warnings may have come up while reading.
-        for warning in opened.info().warnings.clone() {
-            talk.warn(format!("{}: {warning}", self.file.display()));
-        }
-        if survey.range.is_empty() {
+        let survey = opened.survey(talk)?;
+        if survey.min.is_none() {
             talk.warn(format!("{}: no valid height: all {} samples are void", self.file.display(), survey.void));
         }
         let info = opened.info();
         let spacing = opened.frame.spacing();
-        let some = |height: f32| (!survey.range.is_empty()).then_some(height);
         let answer = Answer {
             format: info.format,
             width: info.columns,
             height: info.rows,
             void: survey.void,
             nodata: info.nodata,
-            min: some(survey.range.low),
-            max: some(survey.range.high),
+            min: survey.min,
+            max: survey.max,
             first: survey.first,
             centre: survey.centre,
             last: survey.last,
-            crs: crs_name(&info.georeference.crs),
-            horizontal_unit: horizontal_unit(&info.georeference.crs),
-            vertical_unit: unit(info.vertical_metres),
+            crs: stated(&info.georeference.crs),
+            horizontal_unit: info.georeference.crs.unit(),
+            vertical_unit: name_of_unit(info.vertical_metres),
             geotransform: info.georeference.geotransform,
             cell_m: [spacing.x, spacing.y],
             point_or_area: match info.georeference.registration {
@@ -103,62 +88,9 @@ impl Info {
     }
 }
 
-/// Reads every sample once, a band of rows at a time.
-fn survey(opened: &mut Opened) -> Result<Survey, Failure> {
-    let FileInfo { columns, rows, .. } = *opened.info();
-    let bar = progress(rows as u64, "reading");
-    let mut survey = Survey { range: HeightRange::EMPTY, void: 0, first: None, centre: None, last: None };
-    let band = ((1 << 22) / columns.max(1)).clamp(1, rows).next_multiple_of(opened.block_rows());
-    for row in (0..rows).step_by(band) {
-        let window = Window { column: 0, row, columns, rows: band.min(rows - row) };
-        let heights = opened.read(window)?;
-        for &height in &heights {
-            if height.is_finite() {
-                survey.range = survey.range.union(HeightRange { low: height, high: height });
-            } else {
-                survey.void += 1;
-            }
-        }
-        let sample = |c: usize, r: usize| {
-            let index = r.checked_sub(row)? * columns + c;
-            heights.get(index).copied().filter(|h| h.is_finite())
-        };
-        survey.first = survey.first.or(sample(0, 0));
-        survey.centre = survey.centre.or(sample(columns / 2, rows / 2));
-        survey.last = survey.last.or(sample(columns - 1, rows - 1));
-        bar.inc(window.rows as u64);
-    }
-    bar.finish_and_clear();
-    Ok(survey)
-}
-
 /// A file's name for its coordinate system.
-pub fn crs_name(crs: &Crs) -> Option<&str> {
-    match crs {
-        Crs::Unknown => None,
-        Crs::Geographic { name } | Crs::Projected { name, .. } => Some(name),
-    }
-}
-
-fn horizontal_unit(crs: &Crs) -> String {
-    match crs {
-        Crs::Unknown => "unknown".into(),
-        Crs::Geographic { .. } => "degree".into(),
-        Crs::Projected { metres, .. } => unit(*metres),
-    }
-}
-
-/// The name of a unit of so many metres.
-fn unit(metres: f64) -> String {
-    const NAMES: [(f64, &str); 5] = [
-        (1.0, "metre"),
-        (0.3048, "foot"),
-        (1200.0 / 3937.0, "US survey foot"),
-        (1000.0, "kilometre"),
-        (0.01, "centimetre"),
-    ];
-    let named = NAMES.iter().find(|(m, _)| (m - metres).abs() < 1e-9 * m);
-    named.map_or_else(|| format!("{metres} metres"), |(_, name)| (*name).to_owned())
+fn stated(crs: &Crs) -> Option<&str> {
+    (*crs != Crs::Unknown).then(|| crs.name())
 }
 
 fn table(file: &str, answer: &Answer, opened: &Opened) -> String {

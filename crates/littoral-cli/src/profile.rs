@@ -67,15 +67,14 @@ impl Profile {
         let ending = self.out.as_deref().map(|out| plot::ending(out, &["csv", "svg", "png"])).transpose()?;
         let mut opened = Opened::open(&self.file, talk)?;
         let system = System::of(self.lonlat);
-        let local = |xy| opened.frame.local_from(system, xy).map_err(|e| opened.failure(&e));
-        let (from, to) = (local(self.from)?, local(self.to)?);
+        let (from, to) = (opened.local(system, self.from)?, opened.local(system, self.to)?);
         if from == to {
             return Err(Failure::Usage(
                 "expected two different ends of a profile, got the same twice; change one".into(),
             ));
         }
         let window = opened.window_of([from, to]);
-        let land = opened.part(window)?;
+        let land = opened.part(window, talk)?;
         let spacing = match (self.count, self.exact) {
             (Some(count), _) => ProfilePoints::Even(count as usize),
             (None, true) => ProfilePoints::Crossings,
@@ -93,7 +92,7 @@ impl Profile {
                 false => opened.failure(&opened.outside(system, at)),
             });
         }
-        if summary.over_void > 0.0 {
+        if summary.over_void > 1e-6 * summary.distance {
             let metres = tidy(summary.over_void, 1);
             talk.warn(format!("{}: {metres} m of the line lie over voids or outside the data", self.file.display()));
         }
@@ -115,7 +114,7 @@ impl Profile {
             _ => {}
         }
         if talk.json() {
-            let crs = |p: &ProfilePoint| opened.frame.crs_from(p.position);
+            let crs = |p: &ProfilePoint| opened.frame.crs(p.position);
             let name = out.map(|out| out.display().to_string());
             return talk.print_json(Answer {
                 distance: points.iter().map(|p| p.distance).collect(),
@@ -147,7 +146,7 @@ impl Profile {
     fn csv(&self, opened: &Opened, points: &[ProfilePoint]) -> String {
         let mut text = String::from("distance,x,y,height\n");
         for point in points {
-            let at = opened.frame.crs_from(point.position);
+            let at = opened.frame.crs(point.position);
             let height = point.height.map_or(String::new(), |h| tidy(h, 3));
             let (x, y) = (opened.frame.shown(at.x), opened.frame.shown(at.y));
             let _ = writeln!(text, "{},{x},{y},{height}", tidy(point.distance, 3));

@@ -1,7 +1,7 @@
 //! `littoral render`: pictures and films.
 
 use crate::film;
-use crate::ground::{Frame, Opened, System, datum, height_at};
+use crate::ground::{Frame, Opened, System, height_at};
 use crate::input::{self, Target, WaterLevel};
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
@@ -10,7 +10,6 @@ use littoral::field::{Land, coast};
 use littoral::picture::{self, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water};
 use littoral::space::{Ray, View};
 use littoral_data::write::{self, Layer, PngPixels};
-use littoral_data::{Crs, LoadOptions};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -328,7 +327,7 @@ impl Render {
     fn subject(&self, file: Option<&Path>, talk: &mut Talk) -> Result<Subject, Failure> {
         let (name, land, frame, datum) = match file {
             None => {
-                ("the built-in coast".to_owned(), coast::coast(), Frame::local(), "heights above its sea level".into())
+                ("the built-in coast".to_owned(), coast::coast(), Frame::metres(), "heights above its sea level".into())
             }
             Some(file) => {
                 let (land, frame, datum) = self.loaded(file, talk)?;
@@ -352,10 +351,8 @@ impl Render {
     /// Land at a resolution that fits a picture.
     fn loaded(&self, file: &Path, talk: &mut Talk) -> Result<(Land, Frame, String), Failure> {
         let mut opened = Opened::open(file, talk)?;
-        let _ = (LoadOptions { most_samples: FITTING }, self.full, datum);
-        let land = opened.whole()?;
-        let datum = opened.datum();
-        Ok((land, opened.frame, datum))
+        let (land, frame) = opened.fitting(if self.full { usize::MAX } else { FITTING }, talk)?;
+        Ok((land, frame, opened.datum()))
     }
 
     /// The view, and the point it looks at.
@@ -512,7 +509,7 @@ enum Kind {
 impl Subject {
     /// Local metres of typed coordinates.
     pub fn local(&self, system: System, at: DVec2) -> Result<DVec2, Failure> {
-        self.frame.local_from(system, at).map_err(|e| Failure::Work(format!("{}: {e}", self.name)))
+        self.frame.local(system, at).map_err(|e| Failure::Work(format!("{}: {e}", self.name)))
     }
 
     /// Height (m, stretched) of ground or water below a local position.
@@ -527,7 +524,7 @@ impl Subject {
 
     /// A local position in the file's coordinates, its height as unstretched.
     pub fn given(&self, local: DVec3) -> DVec3 {
-        self.frame.crs_from(local.truncate()).extend(local.z / self.exaggeration)
+        self.frame.crs(local.truncate()).extend(local.z / self.exaggeration)
     }
 
     /// `X,Y,Z` as it can be typed.
@@ -569,10 +566,4 @@ pub fn check_output(out: &Path, inputs: &[&Path]) -> Result<(), Failure> {
         out.display(),
         folder.display()
     )))
-}
-
-/// Whether a coordinate system is in degrees.
-#[allow(dead_code)]
-fn in_degrees(crs: &Crs) -> bool {
-    matches!(crs, Crs::Geographic { .. })
 }

@@ -85,15 +85,14 @@ impl Sight {
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
         let mut opened = Opened::open(&self.file, talk)?;
         let system = System::of(self.lonlat);
-        let local = |p: DVec3| opened.frame.local_from(system, p.truncate()).map_err(|e| opened.failure(&e));
-        let (from, to) = (local(self.from)?, local(self.to)?);
-        let land = opened.part(opened.window_of([from, to]))?;
+        let (from, to) = (opened.local(system, self.from.truncate())?, opened.local(system, self.to.truncate())?);
+        let land = opened.part(opened.window_of([from, to]), talk)?;
         let station = |position, end: DVec3| Station { position, above_ground: end.z };
         let curvature = self.curved.curvature();
         let sight = land
             .sight(station(from, self.from), station(to, self.to), curvature)
             .map_err(|error| explained(&opened, system, error, &[(from, self.from), (to, self.to)]))?;
-        if sight.over_void > 0.0 {
+        if sight.over_void > 1e-6 * sight.distance {
             let metres = tidy(sight.over_void, 1);
             talk.warn(format!(
                 "{}: the ground is unknown below {metres} m of the line; voids do not block it",
@@ -101,7 +100,7 @@ impl Sight {
             ));
         }
         let blocked = sight.blocked_at.map(|obstacle| {
-            let at = opened.frame.crs_from(obstacle.position.truncate());
+            let at = opened.frame.crs(obstacle.position.truncate());
             Obstacle { x: at.x, y: at.y, height: obstacle.position.z, distance: obstacle.distance }
         });
         if talk.json() {

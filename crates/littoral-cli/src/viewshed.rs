@@ -8,7 +8,7 @@ use crate::talk::{Failure, Talk, seconds, tidy};
 use glam::{DVec2, DVec3};
 use littoral::field::Window;
 use littoral::raycast::{Station, Viewshed as Asked};
-use littoral_data::write::{self, GridSamples};
+use littoral_data::write::{self, GeoTags, GridSamples};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -69,7 +69,7 @@ impl Viewshed {
         let mut opened = Opened::open(&self.file, talk)?;
         let started = Instant::now();
         let system = System::of(self.lonlat);
-        let from = opened.frame.local_from(system, self.from.truncate()).map_err(|e| opened.failure(&e))?;
+        let from = opened.local(system, self.from.truncate())?;
         let info = opened.info().clone();
         let (columns, rows) = (info.columns, info.rows);
         // Beyond the radius nothing matters, so nothing is read.
@@ -77,7 +77,7 @@ impl Viewshed {
             None => Window { column: 0, row: 0, columns, rows },
             Some(radius) => opened.window_of([from - radius, from + radius]),
         };
-        let land = opened.part(window)?;
+        let land = opened.part(window, talk)?;
         let raster = land.raster();
         let mut seen = vec![0; raster.heights().len()];
         let station = Station { position: from, above_ground: self.from.z };
@@ -92,12 +92,16 @@ impl Viewshed {
             }
         }
         // Into the file's order, and the whole file's size.
+        let [flip_columns, flip_rows] = info.georeference.flips();
         let mut grid = vec![0; columns * rows];
         for row in 0..window.rows {
-            let line = if opened.frame.north_first() { window.rows - 1 - row } else { row };
+            let line = if flip_rows { window.rows - 1 - row } else { row };
             let into = (window.row + row) * columns + window.column;
-            grid[into..into + window.columns]
-                .copy_from_slice(&seen[line * window.columns..(line + 1) * window.columns]);
+            let into = &mut grid[into..into + window.columns];
+            into.copy_from_slice(&seen[line * window.columns..(line + 1) * window.columns]);
+            if flip_columns {
+                into.reverse();
+            }
         }
         let void = raster.voids().count();
         let note = format!(
@@ -108,8 +112,14 @@ impl Viewshed {
             self.target,
             self.curved.told()
         );
-        let tags = None;
-        write::geotiff(&self.out, &info.georeference, tags, GridSamples::U8(&grid), (void > 0).then_some(VOID), &note)?;
+        write::geotiff(
+            &self.out,
+            &info.georeference,
+            GeoTags::of_file(&self.file).as_ref(),
+            GridSamples::U8(&grid),
+            (void > 0).then_some(VOID),
+            &note,
+        )?;
         let spacing: DVec2 = opened.frame.spacing();
         let square_kilometres = count.seen as f64 * spacing.x * spacing.y / 1e6;
         let elapsed = started.elapsed().as_secs_f64();
@@ -127,13 +137,16 @@ impl Viewshed {
                 refraction: curvature.map(|c| c.refraction),
             });
         }
+        let area = match square_kilometres {
+            area if area < 0.1 => format!("{} m²", tidy(area * 1e6, 0)),
+            area => format!("{} km²", tidy(area, 2)),
+        };
         let share = 100.0 * count.seen as f64 / (columns * rows - void).max(1) as f64;
         talk.print(format!(
-            "{}: {} samples seen, {} % of {columns} × {rows}, {} km², {} ({})\n",
+            "{}: {} samples seen, {} % of {columns} × {rows}, {area}, {} ({})\n",
             self.out.display(),
             count.seen,
             tidy(share, 1),
-            tidy(square_kilometres, 2),
             seconds(elapsed),
             self.curved.told()
         ))

@@ -35,6 +35,17 @@ pub struct GeoTags {
 const RASTER_TYPE: u16 = 1025;
 
 impl GeoTags {
+    /// Those of a TIFF file; `None` for any other file, and for one without keys.
+    pub fn of_file(file: &Path) -> Option<GeoTags> {
+        let mut decoder = tiff::decoder::Decoder::new(std::io::BufReader::new(std::fs::File::open(file).ok()?)).ok()?;
+        // Keys of a thousand coordinate systems are shorter than this; anything longer is broken.
+        const LONGEST: usize = 1 << 16;
+        let directory = decoder.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).ok().filter(|d| d.len() < LONGEST)?;
+        let doubles = decoder.get_tag_f64_vec(Tag::GeoDoubleParamsTag).ok().filter(|d| d.len() < LONGEST);
+        let ascii = decoder.get_tag_ascii_string(Tag::GeoAsciiParamsTag).ok().filter(|d| d.len() < LONGEST);
+        Some(GeoTags { directory, doubles: doubles.unwrap_or_default(), ascii: ascii.unwrap_or_default() })
+    }
+
     /// The least that names a coordinate system by an EPSG code; nothing for one without.
     fn of(georeference: &Georeference) -> GeoTags {
         let code = |name: &str| name.strip_prefix("EPSG:").and_then(|code| code.parse::<u16>().ok());
@@ -175,7 +186,7 @@ mod tests {
 
     fn grid(geotransform: [f64; 6], registration: Registration) -> Georeference {
         let crs = Crs::Projected { name: "EPSG:32610".into(), metres: 1.0, definition: None };
-        Georeference { geotransform, registration, crs, size: [5, 3] }
+        Georeference { geotransform, registration, crs, size: [5, 3], y_south: false }
     }
 
     #[test]
@@ -217,6 +228,7 @@ mod tests {
         assert_eq!(decoder.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).expect("keys"), tags.directory);
         assert_eq!(decoder.get_tag_f64_vec(Tag::GeoDoubleParamsTag).expect("doubles"), tags.doubles);
         assert_eq!(decoder.get_tag_ascii_string(Tag::GeoAsciiParamsTag).expect("text"), tags.ascii);
+        assert_eq!(GeoTags::of_file(&file), Some(tags));
         let DecodingResult::F32(back) = decoder.read_image().expect("samples") else { panic!("floats expected") };
         assert_eq!(back, samples);
     }
