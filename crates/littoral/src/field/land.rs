@@ -4,7 +4,8 @@
 //! face of the land's datum is the raster padded to 2ᵏ × 2ᵏ patches, so that cells of level k are exactly the patches and
 //! every cell's corners lie on samples; the padding is void and never shows.
 
-use super::{HeightField, HeightRange, Raster, Window};
+use super::pyramid::window_range;
+use super::{HeightField, HeightRange, RangePyramid, Raster, Window};
 use crate::space::{Cell, Datum, Place};
 use glam::{DVec2, DVec3, Vec3};
 
@@ -12,6 +13,7 @@ use glam::{DVec2, DVec3, Vec3};
 #[derive(Clone, Debug)]
 pub struct Land {
     raster: Raster,
+    ranges: RangePyramid,
     origin: DVec2,
     /// The quadtree level at which cells are patches between four neighbouring samples.
     finest: u8,
@@ -28,7 +30,18 @@ impl Land {
     pub fn at(raster: Raster, origin: DVec2) -> Land {
         let patches = (raster.columns().max(raster.rows()) - 1).next_power_of_two();
         let finest = patches.trailing_zeros() as u8;
-        Land { raster, origin, finest }
+        let ranges = RangePyramid::new(&raster);
+        Land { raster, ranges, origin, finest }
+    }
+
+    /// How low and high the surface reaches over every aligned square of patches.
+    pub fn ranges(&self) -> &RangePyramid {
+        &self.ranges
+    }
+
+    /// Bytes of memory held: heights, void mask and pyramids.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.raster.heights()) + self.raster.voids().bytes() + self.ranges.bytes()
     }
 
     /// The samples.
@@ -59,14 +72,28 @@ impl Land {
     /// The four heights round the patch that holds a world position, and the position within it; `None` where void or
     /// outside. Corners: south-west, south-east, north-west, north-east.
     fn patch(&self, xy: DVec2) -> Option<([f32; 4], DVec2)> {
-        let lattice = self.lattice(xy);
+        self.patch_at(self.lattice(xy))
+    }
+
+    /// The same for a position in units of samples.
+    fn patch_at(&self, lattice: DVec2) -> Option<([f32; 4], DVec2)> {
         let last = DVec2::new((self.raster.columns() - 1) as f64, (self.raster.rows() - 1) as f64);
         if !(lattice.cmpge(DVec2::ZERO).all() && lattice.cmple(last).all()) {
             return None;
         }
         let base = lattice.floor().min(last - 1.0);
         let (column, row) = (base.x as usize, base.y as usize);
-        Some((self.corners(column, row)?, lattice - base))
+        if let Some(corners) = self.corners(column, row) {
+            return Some((corners, lattice - base));
+        }
+        // On a line between patches the one before may exist where the one after does not.
+        let back = |at: f64, base: f64| if at == base && base > 0.0 { &[0.0, 1.0][..] } else { &[0.0] };
+        let (backs_x, backs_y) = (back(lattice.x, base.x), back(lattice.y, base.y));
+        let mut steps = backs_y.iter().flat_map(|&j| backs_x.iter().map(move |&i| DVec2::new(i, j)));
+        steps.find_map(|step| {
+            let base = base - step;
+            Some((self.corners(base.x as usize, base.y as usize)?, lattice - base))
+        })
     }
 
     /// The heights at the corners of the patch north-east of a sample; `None` if any is void.
@@ -77,11 +104,7 @@ impl Land {
 
     /// Exact height (m) of the surface below a world position (m); `None` where void or outside.
     pub fn height_at(&self, xy: DVec2) -> Option<f32> {
-        let ([a, b, c, d], f) = self.patch(xy)?;
-        let (u, v) = (f.x as f32, f.y as f32);
-        let south = a + (b - a) * u;
-        let north = c + (d - c) * u;
-        Some(south + (north - south) * v)
+        self.patch(xy).map(interpolate)
     }
 
     /// The upward unit normal of the surface below a world position (m).
@@ -95,7 +118,7 @@ impl Land {
 
     /// Lowest and highest height of all valid samples.
     pub fn height_range(&self) -> HeightRange {
-        self.raster.range()
+        self.ranges.range()
     }
 
     /// Replaces the samples of `window` (row by row from the south; not finite = void) and rebuilds only what depends on
@@ -104,8 +127,38 @@ impl Land {
     /// # Panics
     /// If the window leaves the raster or the number of heights is not its size.
     pub fn edit(&mut self, window: Window, heights: &[f32]) {
+        let inside =
+            window.column + window.columns <= self.raster.columns() && window.row + window.rows <= self.raster.rows();
+        assert!(inside, "{window:?} leaves a raster of {} × {}", self.raster.columns(), self.raster.rows());
+        let before = window_range(&self.raster, window);
         self.raster.replace(window, heights);
+        self.ranges.edited(&self.raster, window, before);
     }
+
+    /// Range of the surface over a part of one patch, `from` and `to` being positions within it. Over a rectangle a
+    /// bilinear function takes its extremes in the corners.
+    fn part_range(&self, column: usize, row: usize, from: DVec2, to: DVec2) -> HeightRange {
+        if column + 1 >= self.raster.columns() || row + 1 >= self.raster.rows() {
+            return HeightRange::EMPTY;
+        }
+        let Some(corners) = self.corners(column, row) else { return HeightRange::EMPTY };
+        let [a, b, c, d] = corners.map(f64::from);
+        let at = |u: f64, v: f64| (a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v;
+        let ends = [at(from.x, from.y), at(to.x, from.y), at(from.x, to.y), at(to.x, to.y)];
+        let (low, high) =
+            (ends.into_iter().fold(f64::INFINITY, f64::min), ends.into_iter().fold(f64::NEG_INFINITY, f64::max));
+        // What rounding may add to a height asked for in `f32`.
+        let slack = 1e-6 * (a.abs().max(b.abs()).max(c.abs()).max(d.abs()));
+        HeightRange { low: (low - slack) as f32, high: (high + slack) as f32 }
+    }
+}
+
+/// The bilinear height at a position within a patch.
+fn interpolate(([a, b, c, d], at): ([f32; 4], DVec2)) -> f32 {
+    let (u, v) = (at.x as f32, at.y as f32);
+    let south = a * (1.0 - u) + b * u;
+    let north = c * (1.0 - u) + d * u;
+    south * (1.0 - v) + north * v
 }
 
 impl HeightField for Land {
@@ -114,12 +167,23 @@ impl HeightField for Land {
     }
 
     fn height(&self, at: Place) -> Option<f32> {
-        let count = f64::from(1u32 << self.finest);
-        self.height_at(self.origin + at.uv * count * self.raster.spacing())
+        // Straight in lattice units: by way of the world a place on the line between two cells would move off it.
+        self.patch_at(at.uv * f64::from(1u32 << self.finest)).map(interpolate)
     }
 
-    fn range(&self, _cell: Cell) -> HeightRange {
-        self.raster.range()
+    fn range(&self, cell: Cell) -> HeightRange {
+        if cell.level < self.finest {
+            return self.ranges.node(u32::from(self.finest - cell.level), cell.x as usize, cell.y as usize);
+        }
+        let deeper = cell.level - self.finest;
+        let (column, row) = ((cell.x >> deeper) as usize, (cell.y >> deeper) as usize);
+        if deeper == 0 {
+            return self.part_range(column, row, DVec2::ZERO, DVec2::ONE);
+        }
+        let mask = (1u32 << deeper) - 1;
+        let step = f64::exp2(-f64::from(deeper));
+        let from = DVec2::new(f64::from(cell.x & mask), f64::from(cell.y & mask)) * step;
+        self.part_range(column, row, from, from + step)
     }
 
     fn error(&self, _cell: Cell) -> f32 {

@@ -6,9 +6,11 @@
 pub mod coast;
 mod land;
 pub mod noise;
+mod pyramid;
 mod raster;
 
 pub use land::Land;
+pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
 
 use crate::space::{Cell, Datum, Place};
@@ -52,8 +54,8 @@ pub trait HeightField: Sync {
     /// The height at a place (m); `None` where the field is void.
     fn height(&self, at: Place) -> Option<f32>;
 
-    /// Lowest and highest height in `cell`, its border included; empty where it is all void. May be loose, never tight:
-    /// culling and rays trust it.
+    /// Lowest and highest height of the surface over `cell`, up to its border; empty where it is all void. May be loose,
+    /// never too tight: culling and rays trust it.
     fn range(&self, cell: Cell) -> HeightRange;
 
     /// Greatest vertical distance (m) from the surface to `cell` drawn as two triangles over its corners, whichever

@@ -31,6 +31,20 @@ impl VoidMask {
         self.bits.get(index >> 6).is_some_and(|word| word >> (index & 63) & 1 == 1)
     }
 
+    /// Whether any sample of a range of row-major indices is void.
+    pub fn any_in(&self, indices: std::ops::Range<usize>) -> bool {
+        if self.count == 0 || indices.is_empty() {
+            return false;
+        }
+        let (first, last) = (indices.start >> 6, (indices.end - 1) >> 6);
+        (first..=last).any(|word| {
+            let from = if word == first { indices.start & 63 } else { 0 };
+            let to = if word == last { (indices.end - 1) & 63 } else { 63 };
+            let wanted = (u64::MAX << from) & (u64::MAX >> (63 - to));
+            self.bits.get(word).is_some_and(|bits| bits & wanted != 0)
+        })
+    }
+
     /// The bits, 64 samples a word, lowest bit first; empty when nothing is void.
     pub fn words(&self) -> &[u64] {
         &self.bits

@@ -1,4 +1,18 @@
 //! What a ray meets first: hits, shadows, lines of sight and viewsheds against the exact surface.
+//!
+//! The surface is a sheet: the bilinear patches between samples, none where a corner is void, none outside the raster. A
+//! ray hits it from above and from below alike, at the first point of the sheet at a distance in [0, reach]; a ray that
+//! starts on the sheet hits it at 0. Through holes and under the sheet's edges rays pass.
+
+mod bulk;
+mod camera;
+mod lanes;
+mod scene;
+mod stream;
+mod walk;
+
+pub use bulk::{RayCaster, Simd};
+pub use stream::LocalRay;
 
 mod profile;
 mod section;
@@ -12,7 +26,7 @@ pub use viewshed::{Viewshed, ViewshedCount};
 
 use crate::field::Land;
 use crate::space::Ray;
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// Where a ray meets the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,35 +40,35 @@ pub struct Hit {
 }
 
 impl Land {
-    /// The first point at which `ray` meets the surface, from above or below.
+    /// The first point at which `ray` meets the surface, from above or below, in full `f64`. Rays whose numbers are not
+    /// finite or whose direction is zero meet nothing; the reach may be infinite.
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
-        // Marching half a sample at a time: a placeholder of the right shape until the pyramid walk lands.
-        let step = 0.5 * self.raster().spacing().min_element() / ray.direction.truncate().length().max(1e-9);
-        let below = |t: f64| {
-            let p = ray.at(t);
-            self.height_at(p.truncate()).map(|h| p.z - f64::from(h))
-        };
-        let extent = self.extent().length() * 4.0 / ray.direction.length();
-        let end = ray.reach.min(extent);
-        let (mut t, mut last) = (0.0, below(0.0));
-        while t < end {
-            let next = (t + step).min(end);
-            let here = below(next);
-            if let (Some(a), Some(b)) = (last, here)
-                && (a > 0.0) != (b > 0.0)
-            {
-                let distance = t + (next - t) * a / (a - b);
-                let position = ray.at(distance);
-                let normal = self.normal_at(position.truncate()).unwrap_or(Vec3::Z);
-                return Some(Hit { distance, position, normal });
-            }
-            (t, last) = (next, here);
-        }
-        None
+        walk::first_crossing(self, ray, true).map(|crossing| self.hit(ray, crossing))
     }
 
-    /// Whether anything lies between the ends of `ray`.
+    /// [`Land::first_hit`] without the pyramid: every patch under the ray is looked at, one by one. The yardstick for
+    /// tests; slow.
+    pub fn first_hit_patch_by_patch(&self, ray: &Ray) -> Option<Hit> {
+        walk::first_crossing(self, ray, false).map(|crossing| self.hit(ray, crossing))
+    }
+
+    /// Whether `ray` meets the surface anywhere from its origin to its reach.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.first_hit(ray).is_some()
+        walk::first_crossing(self, ray, true).is_some()
+    }
+
+    fn hit(&self, ray: &Ray, crossing: walk::Crossing) -> Hit {
+        let normal = self.patch_normal(crossing.column, crossing.row, crossing.at);
+        Hit { distance: crossing.distance, position: ray.at(crossing.distance), normal }
+    }
+
+    /// The upward unit normal within a patch without a void corner.
+    fn patch_normal(&self, column: usize, row: usize, at: DVec2) -> Vec3 {
+        let (heights, columns) = (self.raster().heights(), self.raster().columns());
+        let sample = |i, j| f64::from(heights[(row + j) * columns + column + i]);
+        let [a, b, c, d] = [sample(0, 0), sample(1, 0), sample(0, 1), sample(1, 1)];
+        let slope = DVec2::new((b - a) * (1.0 - at.y) + (d - c) * at.y, (c - a) * (1.0 - at.x) + (d - b) * at.x);
+        let slope = slope / self.raster().spacing();
+        DVec3::new(-slope.x, -slope.y, 1.0).normalize().as_vec3()
     }
 }

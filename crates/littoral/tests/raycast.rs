@@ -1,0 +1,331 @@
+//! Rays against brute force over all patches, on thousands of small maps.
+
+use glam::{DVec2, DVec3, UVec2, Vec2};
+use littoral::field::{HeightField, HeightRange, Land, Raster, Window};
+use littoral::raycast::{LocalRay, Simd};
+use littoral::space::{Cell, Ray, View};
+use proptest::prelude::*;
+
+/// Corner heights of a patch, if it exists.
+fn corners(land: &Land, column: usize, row: usize) -> Option<[f64; 4]> {
+    Some(land.corners(column, row)?.map(f64::from))
+}
+
+/// Where a ray meets one patch: the parameters of all roots of the quadratic inside the patch, a little tolerant.
+fn patch_hits(land: &Land, ray: &Ray, column: usize, row: usize, slack: f64, out: &mut Vec<f64>) {
+    let Some([a, b, c, d]) = corners(land, column, row) else { return };
+    let spacing = land.raster().spacing();
+    let o = (ray.origin.truncate() - land.origin()) / spacing - DVec2::new(column as f64, row as f64);
+    let w = ray.direction.truncate() / spacing;
+    let (mut t0, mut t1) = (0.0f64, ray.reach);
+    for (o, w) in [(o.x, w.x), (o.y, w.y)] {
+        if w == 0.0 {
+            if !(-slack..=1.0 + slack).contains(&o) {
+                return;
+            }
+        } else {
+            let (p, q) = ((-slack - o) / w, (1.0 + slack - o) / w);
+            t0 = t0.max(p.min(q));
+            t1 = t1.min(p.max(q));
+        }
+    }
+    if t0 > t1 {
+        return;
+    }
+    // f(t) about t0.
+    let p = o + w * t0;
+    let e = a - b - c + d;
+    let f0 = ray.origin.z + t0 * ray.direction.z - (a + (b - a) * p.x + (c - a) * p.y + e * p.x * p.y);
+    let f1 = ray.direction.z - ((b - a) * w.x + (c - a) * w.y + e * (p.x * w.y + p.y * w.x));
+    let f2 = -e * w.x * w.y;
+    let mut root = |s: f64| {
+        if s >= -1e-12 && t0 + s <= t1 + 1e-12 {
+            out.push(t0 + s);
+        }
+    };
+    if f2.abs() < 1e-14 * f1.abs() || f2 == 0.0 {
+        if f1 != 0.0 {
+            root(-f0 / f1);
+        } else if f0 == 0.0 {
+            root(0.0);
+        }
+    } else {
+        let disc = f1 * f1 - 4.0 * f2 * f0;
+        if disc >= 0.0 {
+            let q = -0.5 * (f1 + f1.signum() * disc.sqrt());
+            root(q / f2);
+            if q != 0.0 {
+                root(f0 / q);
+            }
+        }
+    }
+}
+
+fn brute_force(land: &Land, ray: &Ray, slack: f64) -> Option<f64> {
+    let mut hits = Vec::new();
+    for row in 0..land.raster().rows() - 1 {
+        for column in 0..land.raster().columns() - 1 {
+            patch_hits(land, ray, column, row, slack, &mut hits);
+        }
+    }
+    hits.into_iter().reduce(f64::min)
+}
+
+/// Whether a point lies on the surface as nearly as rounding lets one know.
+fn touches(land: &Land, point: DVec3, slack: f64, hair: f64) -> bool {
+    let at = (point.truncate() - land.origin()) / land.raster().spacing();
+    let side = 30.0 * slack;
+    (0..land.raster().rows() - 1).any(|row| {
+        (0..land.raster().columns() - 1).any(|column| {
+            let Some([a, b, c, d]) = corners(land, column, row) else { return false };
+            let p = at - DVec2::new(column as f64, row as f64);
+            let q = p.clamp(DVec2::ZERO, DVec2::ONE);
+            let height = (a * (1.0 - q.x) + b * q.x) * (1.0 - q.y) + (c * (1.0 - q.x) + d * q.x) * q.y;
+            let steep = a.max(b).max(c).max(d) - a.min(b).min(c).min(d);
+            (p - q).abs().max_element() <= side && (point.z - height).abs() <= hair + side * steep
+        })
+    })
+}
+
+/// Fails unless `got` lies between what brute force says of the ray moved up and down by a hair, against patches a hair
+/// larger and smaller: `slack` in cells, and as a part of all heights and lengths.
+fn check(land: &Land, ray: &Ray, got: Option<f64>, slack: f64) -> Result<(), TestCaseError> {
+    let range = land.height_range();
+    let size = f64::from(range.high.abs().max(range.low.abs())).min(1e9) + ray.origin.length();
+    let hair = if range.is_empty() { 0.0 } else { slack * size };
+    let side = slack * 30.0 * land.raster().spacing().max_element();
+    let moves = [(0, 0, -1), (0, 0, 0), (0, 0, 1), (-1, -1, 0), (-1, 1, 0), (1, -1, 0), (1, 1, 0)];
+    let moved = moves.map(|(x, y, z)| {
+        let by = DVec3::new(f64::from(x) * side, f64::from(y) * side, f64::from(z) * hair);
+        Ray { origin: ray.origin + by, ..*ray }
+    });
+    let answers = moved
+        .iter()
+        .flat_map(|ray| [slack, -slack].map(|slack| brute_force(land, ray, slack).unwrap_or(f64::INFINITY)));
+    let (first, last) = answers.fold((f64::INFINITY, 0.0f64), |(first, last), t| (first.min(t), last.max(t)));
+    let hair = 100.0 * slack * (size + first.min(1e9) * ray.direction.length()) / ray.direction.length().max(1e-9);
+    let got = got.unwrap_or(f64::INFINITY);
+    if got < first - hair && touches(land, ray.at(got), slack, slack * size) {
+        return Ok(());
+    }
+    prop_assert!(got >= first - hair && got <= last + hair, "{} is not within {}..{} of {:?}", got, first, last, ray);
+    Ok(())
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Ground {
+    Flat,
+    Gentle,
+    Steep,
+    Spikes,
+}
+
+fn land(seed: u64, columns: usize, rows: usize, spacing: DVec2, ground: Ground, voids: u32) -> Land {
+    let mut state = seed | 1;
+    let mut next = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    let heights = (0..columns * rows)
+        .map(|i| {
+            let (x, y) = ((i % columns) as f32, (i / columns) as f32);
+            let h = match ground {
+                Ground::Flat => 5.0,
+                Ground::Gentle => 20.0 + (0.3 * x).sin() * 2.0 + (0.2 * y).cos() * 3.0 + 0.2 * next(),
+                Ground::Steep => 100.0 * next() - 30.0,
+                Ground::Spikes => {
+                    if next() < 0.05 {
+                        500.0 * next()
+                    } else {
+                        0.0
+                    }
+                }
+            };
+            if next() * 100.0 < voids as f32 { f32::NAN } else { h }
+        })
+        .collect();
+    Land::at(Raster::new(columns, rows, spacing, heights).expect("valid"), DVec2::new(-13.0, 7.5))
+}
+
+prop_compose! {
+    fn any_land()(
+        seed in any::<u64>(), columns in 2usize..20, rows in 2usize..20,
+        spacing in prop_oneof![Just(DVec2::ONE), Just(DVec2::new(2.0, 0.7)), Just(DVec2::new(9.0, 30.0))],
+        ground in prop_oneof![Just(Ground::Flat), Just(Ground::Gentle), Just(Ground::Steep), Just(Ground::Spikes)],
+        voids in prop_oneof![Just(0u32), Just(0), Just(3), Just(30)],
+    ) -> Land {
+        land(seed, columns, rows, spacing, ground, voids)
+    }
+}
+
+/// A ray between two points about the map's box, or aimed exactly at samples, along edges, straight down.
+fn ray_at(land: &Land, kind: u32, k: [f64; 6]) -> Ray {
+    let (origin, extent, spacing) = (land.origin(), land.extent(), land.raster().spacing());
+    let HeightRange { low, high } = land.height_range();
+    let (low, high) = if low > high { (0.0, 1.0) } else { (f64::from(low), f64::from(high)) };
+    let about = |k: [f64; 3]| {
+        let xy = origin + extent * (DVec2::new(k[0], k[1]) * 1.6 - 0.3);
+        xy.extend(low + (high - low + 5.0) * (k[2] * 1.6 - 0.3))
+    };
+    let sample = |k: [f64; 3]| {
+        let columns = (land.raster().columns() as f64 * k[0]).floor();
+        let rows = (land.raster().rows() as f64 * k[1]).floor();
+        let index = rows as usize * land.raster().columns() + columns as usize;
+        let height = f64::from(land.raster().heights()[index]);
+        (origin + DVec2::new(columns, rows) * spacing).extend(height)
+    };
+    let (p, q) = ([k[0], k[1], k[2]], [k[3], k[4], k[5]]);
+    match kind {
+        0 => Ray::new(about(p), about(q) - about(p)),
+        1 => Ray::between(about(p), about(q)),
+        2 => Ray::new(about(p), sample(q) - about(p)),
+        3 => Ray::new(sample(p) + DVec3::Z * (100.0 * (k[2] - 0.3)), -DVec3::Z),
+        4 => Ray::new(about(p), DVec3::new(0.0, 0.0, if k[3] < 0.5 { -2.0 } else { 0.5 })),
+        // Along a grid line, and along a diagonal through samples.
+        5 => Ray::new(
+            sample(p) + DVec3::Z * (10.0 * k[2] - 3.0),
+            DVec3::new(if k[3] < 0.5 { 1.0 } else { -1.0 }, 0.0, k[5] - 0.6),
+        ),
+        6 => Ray::new(sample(p) + DVec3::Z * 10.0, DVec3::new(spacing.x, -spacing.y, k[5] * 4.0 - 4.0)),
+        7 => Ray::between(sample(p) + DVec3::Z * 1e-3, sample(q) + DVec3::Z * 1e-3),
+        // From far away.
+        _ => {
+            let target = about(q);
+            let from = target + (about(p) - target).normalize_or(DVec3::X) * 1e7;
+            Ray::new(from, target - from)
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn single_rays_equal_brute_force(land in any_land(), kind in 0u32..9, k in any::<[u32; 6]>()) {
+        let ray = ray_at(&land, kind, k.map(|k| f64::from(k) / 4_294_967_296.0));
+        let hit = land.first_hit(&ray);
+        // What 10⁷ m away is known to 10⁻⁹ of a cell: so are lines between patches.
+        let slack = if kind == 8 { 1e-8 } else { 1e-10 };
+        check(&land, &ray, hit.map(|hit| hit.distance), slack)?;
+        prop_assert_eq!(land.any_hit(&ray), hit.is_some());
+        let slow = land.first_hit_patch_by_patch(&ray);
+        // At the rim of a hole the walk may pass the very corner of a patch without looking at it.
+        if land.raster().voids().any() {
+            check(&land, &ray, slow.map(|hit| hit.distance), slack)?;
+        } else {
+            prop_assert_eq!(slow.map(|hit| hit.distance), hit.map(|hit| hit.distance), "the pyramid changed the answer");
+        }
+    }
+
+    #[test]
+    fn streams_equal_brute_force(land in any_land(), k in prop::collection::vec(any::<([u32; 6], u8)>(), 1..40)) {
+        let anchor = DVec3::new(-10.0, 10.0, 3.0);
+        let rays: Vec<LocalRay> = k.iter().map(|(k, kind)| {
+            let ray = ray_at(&land, u32::from(kind % 8), k.map(|k| f64::from(k) / 4_294_967_296.0));
+            LocalRay { reach: ray.reach as f32, ..LocalRay::new((ray.origin - anchor).as_vec3(), ray.direction.as_vec3()) }
+        }).collect();
+        let mut distances = vec![0.0; rays.len()];
+        land.caster(anchor).first_hits(&rays, &mut distances);
+        for simd in [Simd::Portable, Simd::Avx2, Simd::Avx512].into_iter().filter(|simd| simd.available()) {
+            let caster = land.caster(anchor).with_simd(simd);
+            let mut again = vec![0.0; rays.len()];
+            caster.first_hits(&rays, &mut again);
+            prop_assert_eq!(&again, &distances, "{:?} differs", simd);
+            let mut any = vec![false; rays.len()];
+            caster.any_hits(&rays, &mut any);
+            prop_assert!(any.iter().zip(&distances).all(|(any, t)| *any == t.is_finite()));
+        }
+        for (ray, distance) in rays.iter().zip(distances) {
+            let exact = Ray { origin: anchor + ray.origin.as_dvec3(), direction: ray.direction.as_dvec3(), reach: f64::from(ray.reach) };
+            check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
+        }
+    }
+
+    #[test]
+    fn ranges_hold_the_surface_and_edits_equal_rebuilding(
+        mut land in any_land(), k in any::<[u8; 4]>(), seed in any::<u64>(), taller in any::<bool>(), cell in any::<[u32; 2]>(), level in 0u8..9,
+    ) {
+        let (columns, rows) = (land.raster().columns(), land.raster().rows());
+        let (column, row) = (k[0] as usize % columns, k[1] as usize % rows);
+        let window = Window { column, row, columns: 1 + k[2] as usize % (columns - column), rows: 1 + k[3] as usize % (rows - row) };
+        let mut state = seed | 1;
+        let heights: Vec<f32> = (0..window.columns * window.rows).map(|_| {
+            state ^= state << 13; state ^= state >> 7; state ^= state << 17;
+            if state % 9 == 0 { f32::NAN } else { (state % 1000) as f32 * if taller { 3.0 } else { 0.01 } }
+        }).collect();
+        for edited in [false, true] {
+            if edited {
+                land.edit(window, &heights);
+                prop_assert_eq!(land.height_range(), land.raster().range());
+            }
+            let cell = Cell { face: 0, level, x: cell[0] >> (32 - u32::from(level)).min(31), y: cell[1] >> (32 - u32::from(level)).min(31) };
+            let cell = if level == 0 { Cell::face(0) } else { cell };
+            let range = land.range(cell);
+            let mut inside = vec![0.0f32; 33 * 33];
+            land.fill(cell, 33, &mut inside);
+            // The border of a cell may belong to a neighbour's patch alone, where its own is void.
+            let inner = (1..32).flat_map(|row| inside[33 * row + 1..33 * row + 32].iter().copied());
+            for height in inner.filter(|h| !h.is_nan()) {
+                prop_assert!(range.contains(height), "{} outside {:?} of {:?}", height, range, cell);
+            }
+            let fresh = Land::at(land.raster().clone(), land.origin());
+            let there = fresh.range(cell);
+            prop_assert_eq!(there.is_empty(), range.is_empty());
+            if !range.is_empty() {
+                let span = land.height_range().high - land.height_range().low + 3100.0;
+                prop_assert!((there.low - range.low).abs() <= span * 4e-5 && (there.high - range.high).abs() <= span * 4e-5);
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn views_equal_brute_force(land in any_land(), k in any::<[u32; 6]>(), size in (1u32..90, 1u32..150), field in 0.01f32..2.5) {
+        let ray = ray_at(&land, 0, k.map(|k| f64::from(k) / 4_294_967_296.0));
+        let view = View::looking_at(ray.origin, ray.origin + ray.direction, field, UVec2::new(size.0, size.1));
+        let (corner, right, down) = view.frame();
+        let mut distances = vec![0.0; (size.0 * size.1) as usize];
+        let sample = Vec2::new(0.3, 0.6);
+        land.caster(view.eye).par_view_hits(&view, sample, &mut distances);
+        for simd in [Simd::Portable, Simd::Avx2, Simd::Avx512].into_iter().filter(|simd| simd.available()) {
+            let mut again = vec![0.0; distances.len()];
+            land.caster(view.eye).with_simd(simd).view_hits(&view, sample, 0..size.1, &mut again);
+            prop_assert_eq!(&again, &distances, "{:?} differs", simd);
+        }
+        for (index, distance) in distances.into_iter().enumerate().step_by(1 + (size.0 * size.1) as usize / 50) {
+            let (x, y) = ((index as u32 % size.0) as f32 + sample.x, (index as u32 / size.0) as f32 + sample.y);
+            let exact = Ray::new(view.eye, (corner + right * x + down * y).as_dvec3());
+            check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
+        }
+    }
+}
+
+#[test]
+fn nonsense_meets_nothing() {
+    let land = land(3, 17, 9, DVec2::ONE, Ground::Steep, 0);
+    let here = DVec3::new(0.0, 10.0, 1000.0);
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        assert_eq!(land.first_hit(&Ray::new(here.with_x(bad), -DVec3::Z)), None);
+        assert_eq!(land.first_hit(&Ray::new(here, DVec3::new(bad, 0.0, -1.0))), None);
+    }
+    assert_eq!(land.first_hit(&Ray::new(here, DVec3::ZERO)), None);
+    assert_eq!(land.first_hit(&Ray { reach: f64::NAN, ..Ray::new(here, -DVec3::Z) }), None);
+    assert_eq!(land.first_hit(&Ray { reach: -1.0, ..Ray::new(here, -DVec3::Z) }), None);
+    assert!(land.first_hit(&Ray::new(here, -DVec3::Z)).is_some());
+    assert!(land.first_hit(&Ray::new(here, DVec3::new(1e-300, -1e-200, -1.0))).is_some());
+    assert!(land.first_hit(&Ray::new(here, DVec3::new(0.0, 0.0, -1e-30))).is_some());
+    let huge = land.first_hit(&Ray::new(DVec3::splat(1e300), DVec3::splat(-1e300)));
+    assert!(huge.is_none_or(|hit| hit.distance.is_finite()));
+}
+
+#[test]
+fn all_void_land_meets_nothing() {
+    let land = Land::new(Raster::new(9, 5, DVec2::ONE, vec![f32::NAN; 45]).expect("valid"));
+    assert_eq!(land.first_hit(&Ray::new(DVec3::Z * 10.0, -DVec3::Z)), None);
+    assert!(land.range(Cell::face(0)).is_empty());
+}
