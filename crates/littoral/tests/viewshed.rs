@@ -88,7 +88,7 @@ fn ground(columns: usize, rows: usize, seed: u64, kind: u8, voids: bool) -> Vec<
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn equals_a_line_of_sight_to_every_sample(

@@ -10,6 +10,9 @@
 use crate::field::Land;
 use glam::DVec2;
 
+/// The pyramid's highest step of a node without ground.
+const EMPTY: u16 = 0;
+
 /// One parabola of a vertical section.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
@@ -81,6 +84,7 @@ pub(super) struct Line {
     /// Along the major axis: where it starts and how far it runs; along the minor one: where it starts and its slope.
     major: f64,
     run: f64,
+    per_run: f64,
     minor: f64,
     slope: f64,
 }
@@ -92,7 +96,7 @@ impl Line {
         let eastward = by.x.abs() >= by.y.abs();
         let (major, run, minor, rise) =
             if eastward { (from.x, by.x, from.y, by.y) } else { (from.y, by.y, from.x, by.x) };
-        Line { to, eastward, major, run, minor, slope: if run == 0.0 { 0.0 } else { rise / run } }
+        Line { to, eastward, major, run, per_run: 1.0 / run, minor, slope: if run == 0.0 { 0.0 } else { rise / run } }
     }
 
     /// The strips between neighbouring lattice lines of the major axis that the line touches: the half-open range of
@@ -153,13 +157,13 @@ impl Line {
         self.minor + self.slope * (major - self.major)
     }
 
-    /// Fractions of the line between which it lies in the strips from `first` up to `last` (not included): the smaller
+    /// Fractions of the line, to rounding, between which it lies in the strips from `first` up to `last` (not included): the smaller
     /// one first.
     pub fn fractions(&self, first: i64, last: i64) -> (f64, f64) {
         if self.run == 0.0 {
             return (0.0, 1.0);
         }
-        let (a, b) = ((first as f64 - self.major) / self.run, (last as f64 - self.major) / self.run);
+        let (a, b) = ((first as f64 - self.major) * self.per_run, (last as f64 - self.major) * self.per_run);
         (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0))
     }
 
@@ -171,15 +175,19 @@ impl Line {
         let (a, b) = (self.minor_at(a.max(low)), self.minor_at(b.min(high)));
         // A line on the border of two nodes, or within rounding of it, counts for both.
         let scale = 1.0 / (1u64 << level) as f64;
-        let first = (((a.min(b) - 1e-6) * scale).floor() as i64).max(0);
-        let last = ((a.max(b) + 1e-6) * scale).floor() as i64;
+        let (first, last) = (((a.min(b) - 1e-6) * scale) as usize, ((a.max(b) + 1e-6) * scale) as usize);
         let pyramid = land.ranges();
-        let mut highest = f64::NEG_INFINITY;
-        for minor in first..=last {
-            let (column, row) = if self.eastward { (block, minor) } else { (minor, block) };
-            highest = highest.max(f64::from(pyramid.node(level, column as usize, row as usize).high));
-        }
-        highest
+        let nodes = pyramid.levels[level as usize - 1];
+        let steps = |minor: usize| {
+            let (column, row) = if self.eastward { (block as usize, minor) } else { (minor, block as usize) };
+            if column < nodes.columns && row < nodes.rows {
+                pyramid.highs[nodes.offset + row * nodes.columns + column]
+            } else {
+                EMPTY
+            }
+        };
+        let highest = (first..=last).map(steps).fold(EMPTY, u16::max);
+        if highest == EMPTY { f64::NEG_INFINITY } else { f64::from(pyramid.height(highest)) }
     }
 
     /// The pieces within one strip, at most three, in order of the line; calls `visit` for each.

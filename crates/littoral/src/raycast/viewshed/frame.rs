@@ -71,6 +71,11 @@ impl Frame {
         }
     }
 
+    /// Index steps from one sample of a ring to the next.
+    pub fn step(&self) -> usize {
+        if self.eastward { self.columns } else { 1 }
+    }
+
     /// The samples of a ring that belong to this quarter, as a half-open range: diagonals belong to east and west.
     pub fn belonging(&self, ring: i64) -> std::ops::Range<i64> {
         let distance = self.distance(ring);

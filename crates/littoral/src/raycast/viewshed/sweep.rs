@@ -300,11 +300,11 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
 
             let visible = asked & above & free;
             found.seen += visible.count_ones() as usize;
+            let (first, step) = (frame.index(ring.major, from), frame.step());
             let mut bits = visible;
             while bits != 0 {
-                let minor = from + i64::from(bits.trailing_zeros());
                 // SAFETY: the sample belongs to this wedge only.
-                unsafe { seen.mark(frame.index(ring.major, minor)) };
+                unsafe { seen.mark(first + step * bits.trailing_zeros() as usize) };
                 bits &= bits - 1;
             }
             // Samples in doubt: above the horizon of how many rings ago? Only the strips since then are in question.
