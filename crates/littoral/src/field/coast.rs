@@ -113,7 +113,8 @@ impl Shore {
         let land: Vec<bool> = carved.heights.iter().map(|h| *h > 0.0).collect();
         let to_sea = distances(&land, carved.side);
         let to_land = distances(&land.iter().map(|l| !l).collect::<Vec<_>>(), carved.side);
-        let inland = to_sea.iter().zip(&to_land).map(|(sea, land)| (sea - land) * carved.spacing).collect();
+        let inland: Vec<f32> = to_sea.iter().zip(&to_land).map(|(sea, land)| (sea - land) * carved.spacing).collect();
+        let inland = rounded(&rounded(&inland, carved.side), carved.side);
         Shore { side: carved.side, spacing: f64::from(carved.spacing), hills: carved.heights.clone(), inland }
     }
 
@@ -228,27 +229,60 @@ impl Shore {
     }
 }
 
-/// Distance in samples, by chamfers, from each true sample to the nearest false one; 0 at false ones.
+/// Distance in samples from each true sample to the nearest false one, found by handing on the offset to it in two sweeps
+/// (P.-E. Danielsson, "Euclidean distance mapping", 1980); 0 at false ones.
 fn distances(inside: &[bool], side: usize) -> Vec<f32> {
-    const DIAGONAL: f32 = std::f32::consts::SQRT_2;
-    let mut d: Vec<f32> = inside.iter().map(|&i| if i { 1e6 } else { 0.0 }).collect();
-    for pass in 0..2 {
+    const FAR: i32 = 20_000;
+    let length = |(x, y): (i32, i32)| x * x + y * y;
+    let mut offsets: Vec<(i32, i32)> = inside.iter().map(|&i| if i { (FAR, FAR) } else { (0, 0) }).collect();
+    let back: [(isize, isize); 4] = [(-1, 0), (0, -1), (-1, -1), (1, -1)];
+    for sign in [1, -1] {
         for k in 0..side * side {
-            let at = if pass == 0 { k } else { side * side - 1 - k };
+            let at = if sign == 1 { k } else { side * side - 1 - k };
             let (x, y) = (at % side, at / side);
-            let mut best = d[at];
-            let steps: [(isize, isize, f32); 4] = [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, DIAGONAL), (1, -1, DIAGONAL)];
-            for (dx, dy, length) in steps {
-                let sign = if pass == 0 { 1 } else { -1 };
+            let mut best = offsets[at];
+            for (dx, dy) in back {
                 let (nx, ny) = (x.wrapping_add_signed(sign * dx), y.wrapping_add_signed(sign * dy));
                 if nx < side && ny < side {
-                    best = best.min(d[ny * side + nx] + length);
+                    let (ox, oy) = offsets[ny * side + nx];
+                    let through = (ox + (sign * dx) as i32, oy + (sign * dy) as i32);
+                    if length(through) < length(best) {
+                        best = through;
+                    }
                 }
             }
-            d[at] = best;
+            offsets[at] = best;
+        }
+        // A second look along the rows reaches what lies on the other side.
+        for k in 0..side * side {
+            let at = if sign == 1 { side * side - 1 - k } else { k };
+            let next = (at % side).wrapping_add_signed(sign);
+            if next < side {
+                let (ox, oy) = offsets[at - at % side + next];
+                let through = (ox + sign as i32, oy);
+                if length(through) < length(offsets[at]) {
+                    offsets[at] = through;
+                }
+            }
         }
     }
-    d
+    offsets.into_iter().map(|o| (length(o) as f32).sqrt()).collect()
+}
+
+/// Rounds the stairs of a grid by averaging each value with its neighbours.
+fn rounded(values: &[f32], side: usize) -> Vec<f32> {
+    let mean = |i: usize| {
+        let (x, y) = (i % side, i / side);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for r in y.saturating_sub(1)..(y + 2).min(side) {
+            for c in x.saturating_sub(1)..(x + 2).min(side) {
+                sum += values[r * side + c];
+                count += 1.0;
+            }
+        }
+        sum / count
+    };
+    (0..side * side).into_par_iter().map(mean).collect()
 }
 
 /// A smooth step from 0 at `from` to 1 at `to`, either way round.
