@@ -18,12 +18,15 @@ mod error;
 pub mod formats;
 mod georeference;
 pub mod path;
+mod image;
 mod reduce;
 mod source;
 mod survey;
 pub mod voids;
 pub mod write;
+mod wkt;
 
+pub use crate::image::{BEHIND, Image, image_from, open_image};
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};
 pub use error::Error;
 pub use georeference::{Georeference, Registration, metres_per_degree};

@@ -11,11 +11,14 @@ pub struct VoidRule {
     pub offset: f64,
     /// Metres in one vertical unit: 1, 0.3048, 1200/3937 …
     pub metres: f64,
+    /// Whether −32 768, −32 767 and −9999 are void though the file does not say so. Off where every number is a height, as
+    /// in formats that spread a range of heights over all sixteen bits.
+    pub sentinels: bool,
 }
 
 impl Default for VoidRule {
     fn default() -> VoidRule {
-        VoidRule { nodata: None, scale: 1.0, offset: 0.0, metres: 1.0 }
+        VoidRule { nodata: None, scale: 1.0, offset: 0.0, metres: 1.0, sentinels: true }
     }
 }
 
@@ -27,7 +30,7 @@ impl VoidRule {
     #[inline]
     pub fn height(&self, raw: f64) -> f32 {
         // Sentinels that files use without saying so; ±3.4e38 and NaN fall to the plausible range.
-        let sentinel = raw == -32768.0 || raw == -32767.0 || raw == -9999.0;
+        let sentinel = self.sentinels && (raw == -32768.0 || raw == -32767.0 || raw == -9999.0);
         if sentinel || self.nodata.is_some_and(|n| raw == n || raw as f32 == n as f32) {
             return f32::NAN;
         }

@@ -1,9 +1,9 @@
 //! Rays against brute force over all patches, on thousands of small maps.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, UVec2, Vec2};
 use littoral::field::{HeightField, HeightRange, Land, Raster, Window};
 use littoral::raycast::{LocalRay, Simd};
-use littoral::space::{Cell, Ray};
+use littoral::space::{Cell, Ray, View};
 use proptest::prelude::*;
 
 /// Corner heights of a patch, if it exists.
@@ -277,6 +277,30 @@ proptest! {
                 let span = land.height_range().high - land.height_range().low + 3100.0;
                 prop_assert!((there.low - range.low).abs() <= span * 4e-5 && (there.high - range.high).abs() <= span * 4e-5);
             }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn views_equal_brute_force(land in any_land(), k in any::<[u32; 6]>(), size in (1u32..90, 1u32..150), field in 0.01f32..2.5) {
+        let ray = ray_at(&land, 0, k.map(|k| f64::from(k) / 4_294_967_296.0));
+        let view = View::looking_at(ray.origin, ray.origin + ray.direction, field, UVec2::new(size.0, size.1));
+        let (corner, right, down) = view.frame();
+        let mut distances = vec![0.0; (size.0 * size.1) as usize];
+        let sample = Vec2::new(0.3, 0.6);
+        land.caster(view.eye).par_view_hits(&view, sample, &mut distances);
+        for simd in [Simd::Portable, Simd::Avx2, Simd::Avx512].into_iter().filter(|simd| simd.available()) {
+            let mut again = vec![0.0; distances.len()];
+            land.caster(view.eye).with_simd(simd).view_hits(&view, sample, 0..size.1, &mut again);
+            prop_assert_eq!(&again, &distances, "{:?} differs", simd);
+        }
+        for (index, distance) in distances.into_iter().enumerate().step_by(1 + (size.0 * size.1) as usize / 50) {
+            let (x, y) = ((index as u32 % size.0) as f32 + sample.x, (index as u32 / size.0) as f32 + sample.y);
+            let exact = Ray::new(view.eye, (corner + right * x + down * y).as_dvec3());
+            check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
         }
     }
 }

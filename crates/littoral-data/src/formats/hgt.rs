@@ -31,7 +31,7 @@ pub fn open(input: Input) -> Result<Box<dyn Source>, Error> {
             input.length()
         )));
     };
-    let Some([longitude, latitude]) = corner(&input.lower_name()) else {
+    let Some([longitude, latitude]) = corner(&input.lower_name()).or_else(|| corner(&archive_name(&input))) else {
         return Err(input.error(
             "expected a name with the south-west corner, such as N46W123.hgt, got none; rename it: the file itself does not \
              say where it lies",
@@ -51,6 +51,12 @@ pub fn open(input: Input) -> Result<Box<dyn Source>, Error> {
     info.step = 1.0;
     let layout = Layout::plain(0, SampleType::I16, true, columns as usize);
     Ok(Box::new(RawSource::new(input, info, layout, VoidRule { nodata: Some(-32768.0), ..VoidRule::default() })?))
+}
+
+/// The name of the archive that holds the file, in lower case; empty if none does.
+fn archive_name(input: &Input) -> String {
+    let parent = input.name.parent().and_then(|p| p.file_name()).unwrap_or_default().to_string_lossy().to_lowercase();
+    if parent.ends_with(".zip") || parent.ends_with(".gz") { parent } else { String::new() }
 }
 
 fn size(length: u64) -> Option<[u64; 2]> {

@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// No companion file (header, projection, world file) is longer; what is longer is something else of the same name.
 const LONGEST_SIDECAR: u64 = 1 << 20;
@@ -118,6 +119,17 @@ impl Input {
     pub fn from_start(&mut self) -> Result<BufReader<&mut Input>, Error> {
         self.seek(SeekFrom::Start(0)).map_err(|e| Error::io(&self.name, e))?;
         Ok(BufReader::with_capacity(1 << 16, self))
+    }
+
+    /// The bytes as the NetCDF reader wants them: ranges of a file, or memory.
+    pub(crate) fn into_storage(self) -> Result<netcdf_reader::DynStorage, Error> {
+        Ok(match self.bytes {
+            Bytes::Memory(cursor) => Arc::new(netcdf_reader::BytesStorage::new(cursor.into_inner())),
+            Bytes::Disk(file) => {
+                let storage = netcdf_reader::FileStorage::from_file(file);
+                Arc::new(storage.map_err(|e| Error::content(&self.name, format!("expected a readable file, got {e}")))?)
+            }
+        })
     }
 
     /// The companion of this extension, in lower or upper case: `land.hdr` or `land.bil.hdr` beside `land.bil`.

@@ -3,14 +3,24 @@
 //! [`open`] looks at the first bytes, and asks each format in turn whether they are its own. Formats without a mark of
 //! their own (`.hgt`, raw samples) are known by their length, their name or the header beside them.
 
+pub mod archive;
 pub mod ascii_grid;
+pub mod bmp;
+pub mod envi;
+pub mod esri_raw;
 pub mod hgt;
 mod input;
+pub mod named_raw;
+pub mod netcdf;
 pub mod png;
 pub mod raw;
+pub mod surfer;
+pub mod terragen;
 pub mod text;
 pub mod tiff;
 pub mod tiles;
+pub mod usgs_dem;
+pub mod xyz;
 
 pub use input::Input;
 
@@ -35,23 +45,109 @@ pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
 /// As [`open`].
 pub fn open_input(mut input: Input) -> Result<Box<dyn Source>, Error> {
     let head = input.head(HEAD)?;
+    if archive::is_gzip(&head) {
+        input = archive::unpack_gzip(input)?;
+    } else if archive::is_zip(&head) {
+        input = archive::unpack_zip(input)?;
+    }
+    open_unpacked(input)
+}
+
+fn open_unpacked(mut input: Input) -> Result<Box<dyn Source>, Error> {
+    let head = input.head(HEAD)?;
     if head.is_empty() {
         return Err(input.error("expected a height file, got an empty file"));
     }
+    // Formats with a mark of their own.
     if tiff::sniff(&head) {
         return tiff::open_input(input);
     }
-    if png::sniff(&head) {
-        return png::open(input);
+    type Sniffer = fn(&[u8]) -> bool;
+    type Opener = fn(Input) -> Result<Box<dyn Source>, Error>;
+    let marked: [(Sniffer, Opener); 5] = [
+        (png::sniff, png::open),
+        (netcdf::sniff, netcdf::open),
+        (surfer::sniff, surfer::open),
+        (terragen::sniff, terragen::open),
+        (bmp::sniff, bmp::open),
+    ];
+    if let Some((_, open)) = marked.iter().find(|(sniff, _)| sniff(&head)) {
+        return open(input);
     }
-    if text::is_text(&head) && ascii_grid::sniff(&head) {
-        return ascii_grid::open(input);
+    if let Some(problem) = refused(&head) {
+        return Err(input.error(problem));
+    }
+    if usgs_dem::sniff(&head) {
+        return usgs_dem::open(input);
+    }
+    if text::is_text(&head) {
+        if ascii_grid::sniff(&head) && !is_header(&input) {
+            return ascii_grid::open(input);
+        }
+        if let Some(samples) = samples_beside(&input, &head)? {
+            return open_unpacked(samples);
+        }
+        if xyz::sniff(&head) {
+            return xyz::open(input);
+        }
+    }
+    // Plain samples: by the header beside them, by length and name.
+    if let Some(header) = input.sidecar_text("hdr") {
+        if envi::sniff_header(&header) {
+            return envi::open(input, &header);
+        }
+        if esri_raw::sniff_header(&header) {
+            return esri_raw::open(input, &header);
+        }
     }
     if hgt::sniff(&input) {
         return hgt::open(input);
     }
-    let shown: String = head.iter().take(8).map(|b| format!("{b:02x} ")).collect();
-    Err(input.error(format!("expected a height file of a known format, got one that begins with {shown:?}")))
+    if named_raw::sniff(&input) {
+        return named_raw::open(input);
+    }
+    let shown: String = head.iter().take(8).map(|&b| if b.is_ascii_graphic() { b as char } else { '.' }).collect();
+    let bytes: Vec<String> = head.iter().take(8).map(|b| format!("{b:02x}")).collect();
+    Err(input.error(format!(
+        "expected a height file of a known format, got one that begins with {shown:?} ({}); if GDAL knows it, convert it with \
+         `gdal_translate -of GTiff {} land.tif`",
+        bytes.join(" "),
+        input.name.display()
+    )))
+}
+
+/// Files that are known, and known not to be land.
+fn refused(head: &[u8]) -> Option<&'static str> {
+    if head.starts_with(&[0xFF, 0xD8, 0xFF]) {
+        return Some(
+            "expected heights, got a JPEG: its losses would be hills; drape it over land as a picture, or take the PNG or TIFF it came from",
+        );
+    }
+    if head.starts_with(b"GIF8") || head.starts_with(b"RIFF") && head.get(8..12) == Some(b"WEBP") {
+        return Some("expected heights, got a GIF or WebP picture; save it as a 16-bit PNG or a TIFF");
+    }
+    None
+}
+
+fn is_header(input: &Input) -> bool {
+    input.name.extension().is_some_and(|e| e.eq_ignore_ascii_case("hdr"))
+}
+
+/// The samples that a header file belongs to, if this is one: people name either.
+fn samples_beside(input: &Input, head: &[u8]) -> Result<Option<Input>, Error> {
+    let text = String::from_utf8_lossy(head);
+    let extensions = match (envi::sniff_header(&text), esri_raw::sniff_header(&text) && is_header(input)) {
+        (true, _) => &envi::EXTENSIONS[..],
+        (_, true) => &esri_raw::EXTENSIONS[..],
+        _ => return Ok(None),
+    };
+    let candidates =
+        extensions.iter().flat_map(|e| [input.name.with_extension(e), input.name.with_extension(e.to_uppercase())]);
+    match candidates.into_iter().find(|path| *path != input.name && path.is_file()) {
+        Some(path) => Input::file(&path).map(Some),
+        None => Err(input
+            .error(format!("expected samples beside this header, got no file with an extension of {extensions:?}"))),
+    }
 }
 
 /// What a header says, before anything of it is known but the size.
@@ -96,19 +192,18 @@ pub(crate) fn check_size_fits(
 
 /// The coordinate system of the `.prj` beside a file.
 pub(crate) fn crs_from_sidecar(input: &Input) -> Crs {
-    input.sidecar_text("prj").map_or(Crs::Unknown, |text| crs_from_wkt(&text))
+    input.sidecar_text("prj").map_or(Crs::Unknown, |text| Crs::from_wkt(&text))
 }
 
 /// What a world file of one of these extensions and a `.prj` beside the file say.
 pub(crate) fn georeference_beside(input: &Input, columns: usize, rows: usize, extensions: &[&str]) -> Georeference {
-    let _ = extensions;
-    Georeference { crs: crs_from_sidecar(input), ..Georeference::none(columns, rows) }
-}
-
-/// A coordinate system from well-known text.
-pub(crate) fn crs_from_wkt(text: &str) -> Crs {
-    let _ = text;
-    Crs::Unknown
+    let world = extensions.iter().find_map(|extension| input.sidecar_text(extension));
+    let mut georeference = Georeference { crs: crs_from_sidecar(input), ..Georeference::none(columns, rows) };
+    if let Some(geotransform) = world.and_then(|text| Georeference::geotransform_of_world_file(&text)) {
+        georeference.geotransform = geotransform;
+        georeference.y_south = false;
+    }
+    georeference
 }
 
 /// Files that name no coordinate system, but whose coordinates can only be degrees: a cell under half a unit, all within

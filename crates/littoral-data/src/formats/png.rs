@@ -1,5 +1,5 @@
 //! PNG: greys of 8 and 16 bits are metres as they stand; colours are read as Terrarium or Terrain-RGB (see
-//! [`tiles`](super::tiles)). Gamma, colour profiles and the "transparent grey" chunk are left aside: they belong to
+//! [`tiles`]). Gamma, colour profiles and the "transparent grey" chunk are left aside: they belong to
 //! pictures, and programs write zero, the sea, as transparent. Pixels of an alpha channel that is empty are void.
 
 use super::tiles::{self, TRANSPARENT};

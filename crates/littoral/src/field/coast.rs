@@ -37,13 +37,13 @@ pub fn coast() -> Land {
 
 /// A good view of the coast.
 pub fn view(size: UVec2) -> View {
-    let eye = DVec3::new(1330.0, 640.0, 120.0);
-    View::looking_at(eye, DVec3::new(2900.0, 2250.0, 30.0), 36f32.to_radians(), size)
+    let eye = DVec3::new(3380.0, 560.0, 175.0);
+    View::looking_at(eye, DVec3::new(2850.0, 2400.0, 10.0), 38f32.to_radians(), size)
 }
 
 /// Bearing and elevation of the sun that suits [`view`] (rad).
 pub fn sun() -> (f64, f64) {
-    (284f64.to_radians(), 14f64.to_radians())
+    (257f64.to_radians(), 17f64.to_radians())
 }
 
 /// How far inland a place lies (m), by the outline drawn by hand, bent by noise; negative at sea.
@@ -52,7 +52,7 @@ fn inland(at: DVec2) -> f64 {
     let p = at + DVec2::new(bend(11), bend(61));
     // The shore as the height of land over x: a lesser cape in the west, a wide bay, a headland in the east.
     let bump = |middle: f64, width: f64| (-((p.x - middle) / width).powi(2)).exp();
-    let line = 2000.0 - 1150.0 * bump(3750.0, 430.0) + 560.0 * bump(2450.0, 600.0) - 620.0 * bump(1050.0, 480.0) - 150.0 * bump(5100.0, 700.0);
+    let line = 2000.0 - 1150.0 * bump(3750.0, 430.0) + 400.0 * bump(2500.0, 620.0) - 620.0 * bump(1050.0, 480.0) - 150.0 * bump(5100.0, 700.0);
     p.y - line
 }
 
@@ -137,8 +137,8 @@ impl Shore {
 
         // A beach rises gently to its dunes; behind, the hills begin.
         let dune = gradient(at / 70.0, 34).value * 2.6;
-        let beach = 0.045 * d.max(0.0) + (1.2 + dune).max(0.0) * smooth(40.0, 100.0, d);
-        let gentle = beach + (hill - beach).max(0.0) * smooth(60.0, 330.0, d);
+        let beach = 0.04 * d.max(0.0) + (1.2 + dune).max(0.0) * smooth(60.0, 120.0, d);
+        let gentle = beach + (hill - beach).max(0.0) * smooth(90.0, 380.0, d);
 
         // Waves have taken the foot of open hills: what is left ends in a cliff above a platform of rock.
         let crags = Fbm::new(46.0, 5.0, 4, 35).at(at).value;
@@ -178,7 +178,7 @@ impl Shore {
 
     /// Rocks off the headland.
     fn skerries(&self, at: DVec2) -> f64 {
-        let rocks = [(3330.0, 640.0, 62.0, 17.0), (3190.0, 560.0, 36.0, 8.0), (3560.0, 520.0, 30.0, 6.0), (1790.0, 1010.0, 40.0, 9.0)];
+        let rocks = [(3040.0, 1290.0, 40.0, 26.0), (3110.0, 1220.0, 26.0, 9.0), (2960.0, 1390.0, 22.0, 5.0), (1790.0, 1010.0, 60.0, 14.0)];
         let mut best = f64::NEG_INFINITY;
         for (i, (x, y, radius, height)) in rocks.into_iter().enumerate() {
             let away = at - DVec2::new(x, y);

@@ -26,6 +26,8 @@ pub struct Ground<'a> {
     pub mist: f64,
     /// Coarser and coarser means; sample i of a level lies on sample 2i of the finer one. The finest is `land` itself.
     means: Vec<Means>,
+    /// Height (m) of trees and houses at each sample; empty where the samples are of bare ground or too wide apart to tell.
+    standing: Vec<f32>,
 }
 
 struct Means {
@@ -62,7 +64,8 @@ impl<'a> Ground<'a> {
             (Cow::Borrowed(land), Vec::new())
         };
         let means = pyramid_of_means(land.raster());
-        Ground { land, known, mist, means }
+        let standing = standing(land.raster());
+        Ground { land, known, mist, means, standing }
     }
 
     /// Distance between samples (m), the geometric mean of both directions.
@@ -99,6 +102,26 @@ impl<'a> Ground<'a> {
             slope: a.slope.lerp(b.slope, blend),
             hollow: a.hollow + (b.hollow - a.hollow) * blend,
         }
+    }
+
+    /// Height of the trees and houses that the surface at a world position (m) includes (m).
+    pub fn standing(&self, at: DVec2) -> f32 {
+        let raster = self.land.raster();
+        let (columns, rows) = (raster.columns(), raster.rows());
+        if self.standing.is_empty() {
+            return 0.0;
+        }
+        let Some(((i, j), f)) = lattice(at - self.land.origin(), raster.spacing(), columns, rows) else { return 0.0 };
+        // The higher ends of a patch that rises from the ground to a roof are wall, not ground.
+        let s = |i: usize, j: usize| self.standing[j.min(rows - 1) * columns + i.min(columns - 1)];
+        let (a, b, c, d) = (s(i, j), s(i + 1, j), s(i, j + 1), s(i + 1, j + 1));
+        let blend = (a + (b - a) * f.x) + ((c + (d - c) * f.x) - (a + (b - a) * f.x)) * f.y;
+        blend.max(0.6 * a.max(b).max(c).max(d) * f32::from(u8::from(blend > 0.3)))
+    }
+
+    /// Whether the surface includes trees and houses.
+    pub fn has_standing(&self) -> bool {
+        !self.standing.is_empty()
     }
 
     /// The level of the pyramid whose samples are about `footprint` (m) apart.
@@ -198,6 +221,66 @@ fn pyramid_of_means(raster: &Raster) -> Vec<Means> {
     }
 }
 
+/// How high trees and houses stand over the ground below them, if the samples are close enough to show them and do: what a disc of
+/// some 40 m cannot reach from below, where much of the surface is too steep for earth.
+fn standing(raster: &Raster) -> Vec<f32> {
+    const CLOSE: f64 = 2.5;
+    const RADIUS: f64 = 20.0;
+    /// Share of samples with a wall beside them above which a surface is one of trees and houses.
+    const STEEP: f64 = 0.04;
+    let (columns, rows, spacing) = (raster.columns(), raster.rows(), raster.spacing().min_element());
+    let heights = raster.heights();
+    if raster.spacing().max_element() > CLOSE {
+        return Vec::new();
+    }
+    let wall = (1.5 * spacing) as f32;
+    let steep = heights.windows(2).filter(|w| (w[0] - w[1]).abs() > wall).count();
+    if (steep as f64) < STEEP * heights.len() as f64 {
+        return Vec::new();
+    }
+    let radius = (RADIUS / spacing) as usize;
+    let lowest = extremes(heights, columns, rows, radius, f32::min);
+    let opened = extremes(&lowest, columns, rows, radius, f32::max);
+    heights.iter().zip(&opened).map(|(h, o)| h - o).collect()
+}
+
+/// The least (or greatest) value within a square about each sample, by columns and rows (M. van Herk, "A fast algorithm for
+/// local minimum and maximum filters", 1992).
+fn extremes(values: &[f32], columns: usize, rows: usize, radius: usize, pick: fn(f32, f32) -> f32) -> Vec<f32> {
+    let line = |get: &dyn Fn(usize) -> f32, length: usize, out: &mut dyn FnMut(usize, f32)| {
+        let window = 2 * radius + 1;
+        let at = |i: isize| get(i.clamp(0, length as isize - 1) as usize);
+        let padded = length + 2 * radius;
+        let value = |i: usize| at(i as isize - radius as isize);
+        let (mut forward, mut backward) = (vec![0.0; padded], vec![0.0; padded]);
+        for i in 0..padded {
+            forward[i] = if i % window == 0 { value(i) } else { pick(forward[i - 1], value(i)) };
+        }
+        for i in (0..padded).rev() {
+            let ends = i + 1 == padded || (i + 1) % window == 0;
+            backward[i] = if ends { value(i) } else { pick(backward[i + 1], value(i)) };
+        }
+        for i in 0..length {
+            out(i, pick(backward[i], forward[i + window - 1]));
+        }
+    };
+    let mut across = vec![0.0f32; values.len()];
+    across.par_chunks_exact_mut(columns).enumerate().for_each(|(j, row)| {
+        line(&|i| values[j * columns + i], columns, &mut |i, v| row[i] = v);
+    });
+    let mut turned = vec![0.0f32; values.len()];
+    turned.par_chunks_exact_mut(rows).enumerate().for_each(|(i, column)| {
+        line(&|j| across[j * columns + i], rows, &mut |j, v| column[j] = v);
+    });
+    let mut result = across;
+    result.par_chunks_exact_mut(columns).enumerate().for_each(|(j, row)| {
+        for (i, v) in row.iter_mut().enumerate() {
+            *v = turned[i * rows + j];
+        }
+    });
+    result
+}
+
 /// Whether the land has voids or an edge that does not lie under water.
 fn needs_mist(land: &Land, level: f64) -> bool {
     let raster = land.raster();
@@ -245,7 +328,7 @@ fn with_mist(land: &Land, level: f64, mist: f64) -> (Land, Vec<u8>) {
         }
     }
     span_membrane(&mut heights, columns, rows);
-    let fringe = (inner_columns.min(inner_rows) as f32 / 96.0).clamp(0.7, 4.0);
+    let fringe = (inner_columns.min(inner_rows) as f32 / 48.0).clamp(0.7, 12.0);
     let known = distances(&void, columns, rows)
         .into_iter()
         .map(|d| {
@@ -390,6 +473,36 @@ mod tests {
             assert!((s.slope - Vec2::new(0.3, -0.7)).length() < 1e-3, "{footprint}: {}", s.slope);
             assert!(s.hollow.abs() < 1e-3);
         }
+    }
+
+    #[test]
+    fn extremes_are_those_of_the_square() {
+        let (columns, rows) = (13, 9);
+        let values: Vec<f32> = (0..columns * rows).map(|i| ((i * 7919) % 101) as f32).collect();
+        let found = extremes(&values, columns, rows, 2, f32::min);
+        for j in 0..rows {
+            for i in 0..columns {
+                let window = (j.saturating_sub(2)..(j + 3).min(rows))
+                    .flat_map(|r| (i.saturating_sub(2)..(i + 3).min(columns)).map(move |c| (r, c)));
+                let expected = window.map(|(r, c)| values[r * columns + c]).fold(f32::INFINITY, f32::min);
+                assert_eq!(found[j * columns + i], expected);
+            }
+        }
+    }
+
+    #[test]
+    fn houses_stand_on_the_ground_and_hills_do_not() {
+        let town = |x: f64, y: f64| {
+            let house = (x as i64 / 6) % 3 == 0 && (y as i64 / 6) % 3 == 0;
+            0.05 * x + if house { 7.0 } else { 0.0 }
+        };
+        let columns = 120;
+        let heights = (0..columns * columns).map(|i| town((i % columns) as f64, (i / columns) as f64) as f32).collect();
+        let raster = Raster::new(columns, columns, DVec2::ONE, heights).expect("valid");
+        let heights = standing(&raster);
+        assert!((heights[62 * columns + 56] - 7.0).abs() < 1.5 || (heights[57 * columns + 57] - 7.0).abs() < 1.5);
+        let hill = (0..columns * columns).map(|i| (i % columns) as f32 * 0.8).collect();
+        assert!(standing(&Raster::new(columns, columns, DVec2::ONE, hill).expect("valid")).is_empty());
     }
 
     #[test]

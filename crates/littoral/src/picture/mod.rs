@@ -15,6 +15,7 @@
 //! The same scene, view and settings give the same bits, however many threads work.
 
 mod atmosphere;
+mod cartography;
 mod compose;
 mod display;
 mod grain;
@@ -27,11 +28,10 @@ mod skylight;
 mod spectrum;
 mod stage;
 mod texture;
-mod trace;
 mod water;
 
-pub use compose::{Shot, coast_shot, compose};
-pub use display::{Display, Exposure, Picture};
+pub use compose::{Shot, coast_shot, compose, overhead};
+pub use display::{Display, Exposure, Medium, Picture};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
 pub use water::Water;

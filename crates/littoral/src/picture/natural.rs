@@ -35,30 +35,35 @@ const SCREE: Vec3 = Vec3::new(0.190, 0.170, 0.144);
 const SAND: Vec3 = Vec3::new(0.450, 0.372, 0.262);
 const MUD: Vec3 = Vec3::new(0.150, 0.122, 0.088);
 const SNOW: Vec3 = Vec3::new(0.860, 0.880, 0.910);
+const ROOF_TILES: Vec3 = Vec3::new(0.190, 0.085, 0.055);
+const ROOF_SLATE: Vec3 = Vec3::new(0.115, 0.112, 0.115);
+const PLASTER: Vec3 = Vec3::new(0.480, 0.445, 0.390);
 const SEAGRASS: Vec3 = Vec3::new(0.030, 0.042, 0.022);
 
-/// What kind of ground lies at `at` (m) on `surface`.
+/// What kind of ground lies at `at` (m) on `surface`, which is `broad`ly so over some tens of metres.
 ///
 /// `spacing` is the distance between samples (m), `footprint` the width of a pixel on the ground (m) and `water` the level of
-/// the water nearby (m), if any.
+/// the water nearby (m), if any; `standing` is the height of trees and houses that the samples include (m).
 pub fn natural(
     at: DVec3,
     surface: &Surface,
+    broad: &Surface,
     spacing: f32,
     footprint: f32,
     water: Option<f32>,
     climate: &Climate,
+    standing: f32,
 ) -> Material {
     let normal = Vec3::new(-surface.slope.x, -surface.slope.y, 1.0).normalize();
     let steep = surface.slope.length();
     // Wide samples smooth cliffs away: what is left of their slope counts for more.
     let blunt = (spacing / 3.0).max(1.0).log2().min(5.0) / 5.0;
-    let rocky = step(0.50, 1.00, steep * (1.0 + 0.45 * blunt));
+    let rocky = step(0.58, 1.10, steep * (1.0 + 0.60 * blunt));
     let above = water.map_or(f32::INFINITY, |level| at.z as f32 - level);
 
     // Relief below the samples.
     let shore_calm = step(0.5, 6.0, above.abs() + 12.0 * rocky);
-    let amplitude = (0.055 + 0.25 * rocky) * (0.25 + 0.75 * shore_calm);
+    let amplitude = (0.060 + 0.24 * rocky - 0.07 * step(1.4, 2.4, steep)) * (0.25 + 0.75 * shore_calm);
     let mut wavelength = 2.3 * spacing;
     let (mut relief, mut bumps, mut shown) = (Vec3::ZERO, 0.0f32, 0.0f32);
     for octave in 0..11u32 {
@@ -66,8 +71,8 @@ pub fn natural(
         if share == 0.0 {
             break;
         }
-        // Rock is layered: finer upward than along.
-        let layers = DVec3::new(1.0, 1.0, 1.0 + 1.3 * f64::from(rocky));
+        // Cliffs are layered, finer upward than along; on gentler ground layers would show as contour lines.
+        let layers = DVec3::new(1.0, 1.0, 0.35 + 1.7 * f64::from(step(0.9, 1.8, steep)));
         let noise = grain(at * layers / f64::from(wavelength), 100 + octave);
         relief += noise.gradient * layers.as_vec3() * (amplitude * share);
         bumps += noise.value * share;
@@ -83,21 +88,22 @@ pub fn natural(
     let wide = patch(plain, 620.0, footprint, 1) + 0.6 * patch(plain, 260.0, footprint, 2);
     let middle = patch(plain, 74.0, footprint, 3) + 0.6 * patch(plain, 31.0, footprint, 4);
     let fine = patch(plain, 9.0, footprint, 5) + 0.7 * patch(plain, 3.1, footprint, 6) + 0.5 * patch(plain, 0.9, footprint, 7);
-    let moist = (surface.hollow * spacing * 6.0).clamp(-1.0, 1.0);
+    let moist = (broad.hollow * spacing.max(8.0) * 9.0).clamp(-1.0, 1.0);
     let height = at.z as f32;
     let alpine = step(climate.tree_line - 350.0, climate.tree_line + 450.0, height + 180.0 * middle + 120.0 * wide);
 
-    let lush = (0.45 + 0.55 * wide + 0.35 * middle + 0.35 * moist - 0.45 * alpine).clamp(0.0, 1.0);
+    let lush = (0.52 + 0.55 * wide + 0.35 * middle + 0.35 * moist - 0.45 * alpine).clamp(0.0, 1.0);
     let mut albedo = DRY_GRASS.lerp(FRESH_GRASS, lush);
     albedo = albedo.lerp(HEATH, step(0.10, 0.50, 0.6 * middle - 0.5 * wide + 0.25 * fine) * 0.75);
     albedo *= 1.0 + 0.30 * fine + 0.12 * pits;
-    albedo = albedo.lerp(SOIL, 0.6 * step(0.30, 0.55, rough_steep + 0.2 * fine));
+    albedo = albedo.lerp(SOIL, 0.5 * step(0.42, 0.70, rough_steep + 0.2 * fine));
 
     // Woods thin out with height, slope and near the sea.
     let mut openness = 1.0 + 0.25 * pits.min(0.0);
     let mut shaded = roughened;
-    let likes = 0.55 * wide + 0.75 * middle + 0.35 * moist - 0.9 * alpine - 0.5 * step(0.5, 0.8, steep) - 0.10;
-    let wood = step(0.0, 0.10, likes + 0.10 * fine) * step(5.0, 14.0, above) * (1.0 - rocky);
+    let likes = 0.50 * wide + 0.55 * middle + 0.45 * moist - 0.9 * alpine - 0.45 * step(0.5, 0.9, steep) - 0.02;
+    let clumps = 0.45 * patch(plain, 31.0, footprint, 4) + 0.35 * patch(plain, 14.0, footprint, 12) + 0.25 * fine;
+    let wood = step(-0.02, 0.22, likes + clumps) * step(5.0, 14.0, above) * (1.0 - 0.85 * rocky);
     if wood > 0.0 {
         let crown = resolved(7.0, footprint);
         let crowns = grain(at / 7.0, 8);
@@ -109,11 +115,15 @@ pub fn natural(
         openness *= 1.0 - wood * (0.22 - 0.35 * crown * crowns.value).clamp(0.0, 0.5);
     }
 
+    if standing > 1.0 {
+        return stands(at, surface, spacing, footprint, standing, albedo, normal);
+    }
+
     // Bare ground: high, steep or washed by the sea.
-    let scree = alpine.max(step(0.42, 0.66, rough_steep * (1.0 + 0.3 * blunt) + 0.12 * fine) * 0.85);
+    let scree = alpine.max(step(0.52, 0.80, rough_steep * (1.0 + 0.5 * blunt) + 0.12 * fine) * 0.85);
     albedo = albedo.lerp(SCREE * (1.0 + 0.25 * fine + 0.15 * pits), scree * (0.55 + 0.45 * step(-0.3, 0.3, middle)));
-    let washed = (1.0 - step(2.0, 5.0, above + 2.5 * middle)) * step(0.16, 0.34, steep);
-    let rock = step(0.62, 0.95, rough_steep * (1.0 + 0.45 * blunt) + 0.15 * fine).max(washed);
+    let washed = (1.0 - step(2.0, 5.0, above + 2.5 * middle)) * step(0.16, 0.34, steep.max(broad.slope.length()));
+    let rock = step(0.68, 1.05, rough_steep * (1.0 + 0.60 * blunt) + 0.15 * fine).max(washed);
     if rock > 0.0 {
         let bed = 0.5 + 1.1 * patch(DVec3::new(at.x * 0.06, at.y * 0.06, at.z + 0.05 * at.x), 3.5, 0.4 * footprint, 10)
             + 0.5 * patch(DVec3::new(at.x * 0.2, at.y * 0.2, at.z), 0.9, footprint, 11);
@@ -125,7 +135,7 @@ pub fn natural(
     // The shore.
     let mut wet = 0.0;
     if above < 12.0 {
-        let gentle = 1.0 - step(0.20, 0.36, steep);
+        let gentle = (1.0 - step(0.20, 0.36, steep)) * (1.0 - step(0.22, 0.40, broad.slope.length()));
         let sand = (1.0 - step(1.7, 3.0, above + 0.7 * middle + 0.25 * fine)) * gentle;
         // Flats too level for waves to have built are mud and marsh.
         let flat = 1.0 - step(0.003, 0.012, steep + 0.004 * middle);
@@ -153,4 +163,36 @@ pub fn natural(
         openness += (1.0 - openness) * snow;
     }
     Material { albedo: albedo.clamp(Vec3::splat(0.01), Vec3::splat(0.92)), normal: shaded, openness, wet }
+}
+
+/// What stands on the ground: trees where the surface is rough, houses where it is even.
+fn stands(
+    at: DVec3,
+    surface: &Surface,
+    spacing: f32,
+    footprint: f32,
+    standing: f32,
+    ground: Vec3,
+    normal: Vec3,
+) -> Material {
+    let rough = step(0.10, 0.32, surface.hollow.abs() * spacing + 0.10 * (surface.slope.length() - 1.0).max(0.0))
+        * (1.0 - step(24.0, 34.0, standing));
+    let plain = DVec3::new(at.x, at.y, 0.0);
+    let leaves = grain(at / 1.7, 20);
+    let twigs = grain(at / 0.6, 21);
+    let (near, nearer) = (resolved(1.7, footprint), resolved(0.6, footprint));
+    let shaken = leaves.gradient * (0.6 * near) + twigs.gradient * (0.4 * nearer);
+    let tree = WOODS * (1.5 + 0.9 * patch(plain, 21.0, footprint, 22) + 0.5 * near * leaves.value + 0.5 * nearer * twigs.value);
+    let kind = patch(plain, 46.0, 0.1, 23) + 0.5 * patch(plain, 17.0, 0.1, 24);
+    let roof = ROOF_TILES.lerp(ROOF_SLATE, step(-0.02, 0.06, kind)) * (1.0 + 0.15 * patch(at, 2.0, footprint, 25));
+    let wall = step(1.3, 2.4, surface.slope.length());
+    let house = roof.lerp(PLASTER, wall);
+    let share = step(1.0, 2.2, standing);
+    let leafy = (normal - shaken * rough).normalize();
+    Material {
+        albedo: ground.lerp(house.lerp(tree, rough), share),
+        normal: normal.lerp(leafy, share).normalize(),
+        openness: 1.0 - 0.25 * rough * share * (0.5 - near * leaves.value).clamp(0.0, 1.0),
+        wet: 0.0,
+    }
 }

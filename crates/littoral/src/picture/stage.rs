@@ -1,14 +1,15 @@
 //! A scene made ready for pictures, and the tiles that pictures are made of.
 
 use super::atmosphere::{Atmosphere, EARTH, Sky};
+use super::cartography::Tints;
 use super::ground::Ground;
 use super::sampler::Sampler;
 use super::sea::Depths;
-use super::shade::{Ahead, Shaded};
+use super::shade::{Ahead, Near, Shaded};
 use super::skylight::{Skylight, irradiance};
-use super::trace;
-use super::{Picture, Scene, Settings};
-use crate::space::{Ray, View};
+use super::{Medium, Picture, Scene, Settings, Style};
+use crate::raycast::{LocalRay, RayCaster};
+use crate::space::View;
 use glam::{DVec3, UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -26,15 +27,18 @@ pub struct Stage<'a> {
     pub(super) sun: Vec3,
     /// Radiance of mist (kcd/m²).
     pub(super) mist: Vec3,
+    pub(super) tints: Tints,
 }
 
 /// What a view adds to a stage.
-pub(super) struct Lens {
+pub(super) struct Lens<'a> {
     /// The sky and its veil as the eye sees them.
     pub sky: Sky,
     pub eye: DVec3,
     /// Angle that a pixel covers (rad).
     pub pixel: f32,
+    /// Casts rays whose origins count from the eye.
+    caster: RayCaster<'a>,
 }
 
 /// Side of the squares of pixels that one thread works on (pixels).
@@ -53,7 +57,9 @@ impl<'a> Stage<'a> {
     /// Makes `scene` ready.
     pub fn new(scene: &Scene<'a>) -> Stage<'a> {
         let sun = scene.sun.direction(scene.north).as_vec3();
-        let ground = Ground::new(scene.land, scene.water);
+        // On maps the bed is ground like any other, and water only a colour.
+        let map = matches!(scene.style, Style::Tint | Style::Relief);
+        let ground = Ground::new(scene.land, scene.water.filter(|_| !map));
         let air = Atmosphere::new(&scene.air, &scene.sun);
         let range = scene.land.height_range();
         let level = scene.water.map_or(f32::NEG_INFINITY, |w| w.level as f32);
@@ -62,7 +68,13 @@ impl<'a> Stage<'a> {
         let skylight = Skylight::new(&ground, &air, &sky, sun, Vec3::new(0.150, 0.130, 0.090));
         let open = irradiance(&skylight.open, Vec3::Z);
         let mist = 0.42 / std::f32::consts::PI * (air.sunlight(middle.max(0.0)) * sun.z.max(0.0) + open);
-        Stage { scene: *scene, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
+        let tints = Tints { low: range.low, high: range.high, level };
+        Stage { scene: *scene, tints, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
+    }
+
+    /// Whether the style is that of a map, on which water is a colour.
+    pub(super) fn is_map(&self) -> bool {
+        matches!(self.scene.style, Style::Tint | Style::Relief)
     }
 
     /// What `view` sees. `progress` is told the fraction done, now and then, from any thread.
@@ -71,6 +83,7 @@ impl<'a> Stage<'a> {
             sky: Sky::new(&self.air, &self.scene.sun, self.sun, view.eye.z.clamp(2.0, HIGHEST_EYE) as f32),
             eye: view.eye,
             pixel: 1.0 / view.pixels_per_radian,
+            caster: self.ground.land.caster(view.eye),
         };
         let tiles = UVec2::new(view.size.x.div_ceil(TILE), view.size.y.div_ceil(TILE));
         let count = tiles.x as usize * tiles.y as usize;
@@ -85,6 +98,11 @@ impl<'a> Stage<'a> {
             })
             .collect();
         let mut picture = Picture::empty(view.size, view.eye);
+        picture.medium = match self.scene.style {
+            Style::Natural | Style::Image => Medium::Photograph,
+            Style::Tint => Medium::Model,
+            Style::Relief => Medium::Paper,
+        };
         for (i, pixels) in rendered.iter().enumerate() {
             let corner = UVec2::new(i as u32 % tiles.x, i as u32 / tiles.x) * TILE;
             let width = (view.size.x - corner.x).min(TILE) as usize;
@@ -124,54 +142,60 @@ impl<'a> Stage<'a> {
                     false => Vec2::ZERO,
                 };
                 let (px, py) = (x as f32 + 0.5 + jitter.x, y as f32 + 0.5 + jitter.y);
-                rays.push(Ray::new(view.eye, (corner + right * px + down * py).normalize().as_dvec3()));
+                rays.push(LocalRay::new(Vec3::ZERO, (corner + right * px + down * py).normalize()));
             }
         }
-        let mut hits = Vec::new();
-        trace::first_hits(&self.ground.land, &rays, &mut hits);
+        let mut distances = vec![f32::INFINITY; rays.len()];
+        lens.caster.first_hits(&rays, &mut distances);
         let mut shaded: Vec<Shaded> = Vec::with_capacity(rays.len());
         let (mut shadow_rays, mut shadow_of) = (Vec::new(), Vec::new());
         let (mut mirror_rays, mut mirror_of) = (Vec::new(), Vec::new());
         let mut middles = vec![None; pixels];
-        for (k, (ray, hit)) in rays.iter().zip(&hits).enumerate() {
-            let (pixel, s) = (k / per_pixel, k % per_pixel);
-            let ahead = self.ahead(ray, hit.as_ref());
-            if s == samples as usize {
-                middles[pixel] = match ahead {
-                    Ahead::Sky => None,
-                    Ahead::Mist { position } => Some((position, Vec3::Z)),
-                    Ahead::Water { position } => Some((position, Vec3::Z)),
-                    Ahead::Ground { position, normal } => Some((position, normal)),
-                };
-                shaded.push(Shaded::default());
-                continue;
+        for (pixel, middle) in middles.iter_mut().enumerate() {
+            let mut near = Near::default();
+            for s in 0..per_pixel {
+                let k = pixel * per_pixel + s;
+                let ahead = self.ahead(lens.eye, rays[k].direction, distances[k]);
+                if s == samples as usize {
+                    *middle = match ahead {
+                        Ahead::Sky => None,
+                        Ahead::Mist { position } | Ahead::Water { position } => Some((position, Vec3::Z)),
+                        Ahead::Ground { position } => {
+                            Some((position, self.ground.land.normal_at(position.truncate()).unwrap_or(Vec3::Z)))
+                        }
+                    };
+                    shaded.push(Shaded::default());
+                    continue;
+                }
+                let sample = self.shade(lens, rays[k].direction, &ahead, samplers[pixel], s as u32, &mut near);
+                if let Some(ray) = sample.shadow {
+                    shadow_rays.push(ray);
+                    shadow_of.push(k);
+                }
+                if let Some(ray) = sample.mirror {
+                    mirror_rays.push(ray);
+                    mirror_of.push(k);
+                }
+                shaded.push(sample);
             }
-            let sample = self.shade(lens, ray.direction.as_vec3(), &ahead, samplers[pixel], s as u32);
-            if let Some(ray) = sample.shadow {
-                shadow_rays.push(ray);
-                shadow_of.push(k);
-            }
-            if let Some(ray) = sample.mirror {
-                mirror_rays.push(ray);
-                mirror_of.push(k);
-            }
-            shaded.push(sample);
         }
-        let mut blocked = Vec::new();
-        trace::any_hits(&self.ground.land, &shadow_rays, &mut blocked);
+        let mut blocked = vec![false; shadow_rays.len()];
+        lens.caster.any_hits(&shadow_rays, &mut blocked);
         for (&k, &blocked) in shadow_of.iter().zip(&blocked) {
             if !blocked {
                 let sample = &mut shaded[k];
                 sample.light += sample.sunlit;
             }
         }
-        trace::first_hits(&self.ground.land, &mirror_rays, &mut hits);
-        for ((&k, ray), hit) in mirror_of.iter().zip(&mirror_rays).zip(&hits) {
-            let mirrored = self.mirrored(ray, hit.as_ref());
+        distances.clear();
+        distances.resize(mirror_rays.len(), f32::INFINITY);
+        lens.caster.first_hits(&mirror_rays, &mut distances);
+        for ((&k, ray), &distance) in mirror_of.iter().zip(&mirror_rays).zip(&distances) {
+            let mirrored = self.mirrored(lens, ray, distance);
             let sample = &mut shaded[k];
             sample.light += mirrored * sample.mirror_share;
         }
-        let brightest = self.mist.max_element() * 30.0;
+        let brightest = self.mist.max_element().max(1.0) * 30.0;
         (0..pixels)
             .map(|i| {
                 let (mut radiance, mut coverage) = (Vec3::ZERO, 0.0);
@@ -185,34 +209,35 @@ impl<'a> Stage<'a> {
             .collect()
     }
 
-    /// What a ray meets.
-    pub(super) fn ahead(&self, ray: &Ray, hit: Option<&crate::raycast::Hit>) -> Ahead {
-        let ground = hit.map(|h| h.distance);
-        if let Some(water) = self.scene.water {
+    /// What a ray from the eye meets, where `ground` is its distance to the ground (m).
+    fn ahead(&self, eye: DVec3, direction: Vec3, ground: f32) -> Ahead {
+        let direction = direction.as_dvec3();
+        let ground = f64::from(ground);
+        if let Some(water) = self.scene.water.filter(|_| !self.is_map()) {
             // Still water is level; beyond the raster it bends with the Earth, which sets the horizon.
-            let rise = ray.origin.z - water.level;
+            let rise = eye.z - water.level;
             if rise > 0.0 {
-                let flat = -rise / ray.direction.z;
+                let flat = -rise / direction.z;
                 let within = flat > 0.0 && {
-                    let at = ray.at(flat).truncate();
+                    let at = (eye + direction * flat).truncate();
                     let origin = self.scene.land.origin();
                     at.cmpge(origin).all() && at.cmple(origin + self.scene.land.extent()).all()
                 };
-                let distance = if within { Some(flat) } else { curved(rise, ray.direction) };
+                let distance = if within { Some(flat) } else { curved(rise, direction) };
                 if let Some(t) = distance
-                    && ground.is_none_or(|g| t <= g + 1e-6)
-                    && water.covers(ray.at(t).truncate())
+                    && t <= ground * (1.0 + 1e-7)
+                    && water.covers((eye + direction * t).truncate())
                 {
-                    return Ahead::Water { position: ray.at(t).truncate().extend(water.level) };
+                    return Ahead::Water { position: (eye + direction * t).truncate().extend(water.level) };
                 }
             }
         }
-        if let Some(hit) = hit {
-            return Ahead::Ground { position: hit.position, normal: hit.normal };
+        if ground.is_finite() {
+            return Ahead::Ground { position: eye + direction * ground };
         }
-        let rise = ray.origin.z - self.ground.mist;
-        match curved(rise, ray.direction) {
-            Some(t) if rise > 0.0 => Ahead::Mist { position: ray.at(t) },
+        let rise = eye.z - self.ground.mist;
+        match curved(rise, direction) {
+            Some(t) if rise > 0.0 => Ahead::Mist { position: eye + direction * t },
             _ => Ahead::Sky,
         }
     }

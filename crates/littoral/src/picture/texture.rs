@@ -141,8 +141,7 @@ pub(super) fn decode_srgb(v: f32) -> f32 {
 }
 
 /// The sRGB value of linear light in [0, 1]: the inverse of [`decode_srgb`].
-#[cfg(test)]
-fn encode_srgb(v: f32) -> f32 {
+pub(super) fn encode_srgb(v: f32) -> f32 {
     if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 

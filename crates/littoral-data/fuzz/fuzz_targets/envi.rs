@@ -1,0 +1,9 @@
+#![no_main]
+
+use littoral_data::formats;
+use littoral_data_fuzz::{check, header_and_samples, input};
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    let (header, samples) = header_and_samples(data);
+    check(formats::envi::open(input("land.img", samples), &String::from_utf8_lossy(header)));
+});

@@ -1,0 +1,8 @@
+#![no_main]
+
+use littoral_data::formats;
+use littoral_data_fuzz::{check, input};
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    check(formats::ascii_grid::open(input("land.tt3", data)));
+});
