@@ -199,10 +199,6 @@ impl Frame {
         DVec2::new(columns as f64 - 1.0, rows as f64 - 1.0)
     }
 
-    /// Where everything lies.
-    pub fn georeference(&self) -> &Georeference {
-        &self.georeference
-    }
 
     /// Distance between samples (m).
     pub fn spacing(&self) -> DVec2 {
