@@ -91,6 +91,22 @@ fn main() {
         }
     }
     let mut random = 1u64;
+    // The last viewshed against the definition, at random samples.
+    let (mut checked, mut differ) = (0, 0);
+    let observer = Station { position: summit, above_ground: 1000.0 };
+    if wanted.is_none() {
+        for curvature in [None, Some(Curvature::EARTH)] {
+            land.viewshed(observer, &Viewshed { curvature, ..Viewshed::default() }, &mut seen).expect("on the land");
+            for k in 0..10_000 {
+                let index = k * 7_919_317 % (side * side);
+                let target = Station { position: at(index % side, index / side), above_ground: 0.0 };
+                let free = land.sight(observer, target, curvature).expect("on the land").visible();
+                checked += 1;
+                differ += usize::from(free != (seen[index] == 255));
+            }
+        }
+        println!("{checked} random samples against their own lines of sight: {differ} differ");
+    }
     let mut next = || {
         random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         at(0, 0) + DVec2::new((random >> 40) as f64, (random >> 16 & 0xFF_FFFF) as f64) / 16_777_216.0 * land.extent()

@@ -142,6 +142,18 @@ fn equals_a_line_of_sight_to_every_sample_on_larger_maps() {
 }
 
 #[test]
+fn heights_beyond_reason_are_no_special_case() {
+    let mut heights = ground(60, 50, 9, 3, true);
+    heights[777] = 3e38;
+    heights[1500] = -3e38;
+    let land = Land::new(Raster::new(60, 50, DVec2::splat(5.0), heights).expect("valid"));
+    let observer = Station { position: DVec2::new(11.0, 12.0), above_ground: 5.0 };
+    assert_equal(&land, observer, &Viewshed::default());
+    let land = Land::new(Raster::new(40, 30, DVec2::splat(5.0), ground(40, 30, 3, 3, false)).expect("valid"));
+    assert_equal(&land, Station { above_ground: 1e9, ..observer }, &Viewshed::default());
+}
+
+#[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let raster = Raster::new(400, 300, DVec2::splat(5.0), ground(400, 300, 5, 3, true)).expect("valid");
     let land = Land::new(raster);

@@ -160,6 +160,12 @@ impl Land {
             simd,
         };
 
+        let mut count = ViewshedCount::default();
+        if scene.is_beyond_reason() {
+            scene.line_by_line(seen, &mut count);
+            count.seen -= scene.forget(seen);
+            return Ok(count);
+        }
         let wedges = scene.wedges();
         let marks = Seen { marks: seen.as_mut_ptr(), len: seen.len() };
         let decided: Vec<(Frame, usize, Vec<(Pending, bool)>)> = wedges
@@ -171,7 +177,6 @@ impl Land {
             })
             .collect();
 
-        let mut count = ViewshedCount::default();
         for (frame, marked, pending) in &decided {
             count.seen += marked;
             count.lines += pending.len();
@@ -225,6 +230,26 @@ impl Scene<'_> {
         } else {
             !(major..clear).any(|strip| line.blocked_in(self.land, strip))
         }
+    }
+
+    /// Whether heights are so great that single precision could overflow or mean nothing: no land is like that.
+    fn is_beyond_reason(&self) -> bool {
+        let range = self.land.height_range();
+        let drop = self.drop_per_square * self.land.extent().length_squared();
+        let greatest = f64::from(range.low.abs().max(range.high.abs()));
+        !(greatest.max(self.eye_height.abs()).max(self.target_height).max(drop) < 1e7)
+    }
+
+    /// Decides every sample by its line of sight.
+    fn line_by_line(&self, seen: &mut [u8], count: &mut ViewshedCount) {
+        let columns = self.land.raster().columns();
+        seen.par_iter_mut().enumerate().for_each(|(index, mark)| {
+            let target = DVec2::new((index % columns) as f64, (index / columns) as f64);
+            *mark = if self.line(target, index).blocked(self.land) { 0 } else { 255 };
+        });
+        count.lines = seen.len();
+        count.whole_lines = seen.len();
+        count.seen = seen.iter().filter(|&&mark| mark != 0).count();
     }
 
     /// Decides the samples close to the eye, one by one.

@@ -167,6 +167,7 @@ impl Rings {
 
     /// Copies raw heights: rows as they are, columns turned.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop)]
     fn gather<V: Lanes>(&mut self, scene: &Scene, frame: &Frame, inside_low: i64, inside_high: i64) {
         let heights = scene.land.raster().heights();
         let columns = scene.land.raster().columns();

@@ -55,6 +55,8 @@ impl Portable {
     }
 }
 
+// Loops over lanes are what the compiler turns into vectors.
+#[allow(clippy::needless_range_loop)]
 impl Lanes for Portable {
     type Index = [u32; 16];
 

@@ -168,7 +168,8 @@ const LANE: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0,
 /// # Safety
 /// The processor must have the instructions of `V`.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
+// One reason covers the many loads: it stands before the first of them.
+#[allow(clippy::too_many_arguments, clippy::undocumented_unsafe_blocks)]
 unsafe fn cross<V: Lanes, const VOIDS: bool>(
     scene: &Scene,
     frame: &Frame,
@@ -213,9 +214,9 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
         }
         let base = here.floor();
         let offset = (base as i64 - rings.low) as usize;
-        assert!(offset >= 2 && offset + 40 <= rings.stride + 16, "a bin outside its batch of rings");
-        // SAFETY of all loads below: they begin at most 4 after `offset` (targets: 16 after) and read 16 numbers; the row
-        // holds them by the assertion, and the last row is followed by what `fetch` adds.
+        assert!(offset >= 2 && offset + 40 <= rings.stride, "a bin outside its batch of rings");
+        // SAFETY of all loads below: they begin 2 before to 17 after `offset` and read 16 numbers: the assertion keeps them
+        // within the row.
         let far = unsafe { rings.heights.as_ptr().add(row * rings.stride + offset) };
         let near = unsafe { rings.heights.as_ptr().add((row - 1) * rings.stride + offset) };
 
