@@ -32,8 +32,9 @@ use talk::{Failure, Talk};
   littoral info dem.tif            what a file is, and what is assumed about it
   littoral COMMAND --help          all options of a command, with examples
 
-Coordinates are those of the file's own coordinate system (--lonlat: degrees); heights are metres, angles degrees,
-bearings clockwise from north. Results go to stdout, everything else to stderr."
+Coordinates are those of the file's own coordinate system (--lonlat: degrees); heights are
+metres, angles degrees, bearings clockwise from north. Results go to stdout, everything else
+to stderr. Exit codes: 0 done, 1 the input or the work failed, 2 the command line was wrong."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -79,6 +80,11 @@ fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
+    std::panic::set_hook(Box::new(|panic| {
+        littoral_data::write::abandon();
+        eprintln!("littoral: internal error, please report it with the command line: {panic}");
+        std::process::exit(1);
+    }));
     // An interrupted program leaves no half-written files behind.
     let interrupted = ctrlc::set_handler(|| {
         littoral_data::write::abandon();
