@@ -144,7 +144,7 @@ impl RangePyramid {
         let held_extreme = before.low <= self.range.low || before.high >= self.range.high;
         let range = if held_extreme { raster_range(raster) } else { self.range.union(now) };
         let fits = |h: f32| h >= self.height(1) && h <= self.height(STEPS as u16);
-        let outgrown = !range.is_empty() && !(fits(range.low) && fits(range.high));
+        let outgrown = !(range.is_empty() || fits(range.low) && fits(range.high));
         if outgrown || (self.range.is_empty() && !range.is_empty()) {
             *self = RangePyramid::new(raster);
             return;

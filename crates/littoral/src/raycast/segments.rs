@@ -36,7 +36,8 @@ impl RayCaster<'_> {
         assert_eq!(segments.len(), visible.len(), "expected as many answers as segments");
         let (mut rays, mut open, mut hits) = (Vec::with_capacity(BATCH), Vec::with_capacity(BATCH), [false; BATCH]);
         for (segments, visible) in segments.chunks(BATCH).zip(visible.chunks_mut(BATCH)) {
-            (rays.clear(), open.clear());
+            rays.clear();
+            open.clear();
             visible.fill(false);
             match &self.scene {
                 // Through a hole a ray may get under the surface without meeting it.
@@ -157,8 +158,10 @@ fn under<L: Lanes>(l: L, scene: &Scene, level: i32, t: L::F, [x, y, z]: [(f32, f
 fn starts_above<L: Lanes>(l: L, scene: &Scene, x: L::F, y: L::F, z: L::F) -> L::M {
     let (column, row) = (l.floor(x), l.floor(y));
     let (i, j) = (l.iadd(column, l.int(scene.cell[0])), l.iadd(row, l.int(scene.cell[1])));
-    let (inner_i, inner_j) =
-        (l.imax(l.imin(i, l.int(scene.cells[0] - 1)), l.int(0)), l.imax(l.imin(j, l.int(scene.cells[1] - 1)), l.int(0)));
+    let (inner_i, inner_j) = (
+        l.imax(l.imin(i, l.int(scene.cells[0] - 1)), l.int(0)),
+        l.imax(l.imin(j, l.int(scene.cells[1] - 1)), l.int(0)),
+    );
     let inside = l.and(l.ieq(i, inner_i), l.ieq(j, inner_j));
     let at = l.iadd(l.imul(inner_j, l.int(scene.columns)), inner_i);
     // SAFETY: the patch was clamped to the raster's; it has samples east, north and north-east.
