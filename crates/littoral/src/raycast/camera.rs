@@ -170,8 +170,7 @@ impl<'a> ViewRays<'a> {
                 // Bars of 2^level cells; with the width of the beam their footprint still fits 2 × 2 nodes of this level + 1.
                 let cells = l.float(l.shl(one, level));
                 let next = l.add(t, l.mul(cells, pace));
-                let ((x0, x1), (y0, y1)) =
-                    (span(l, [x_low, x_high], x, t, next), span(l, [y_low, y_high], y, t, next));
+                let ((x0, x1), (y0, y1)) = (span(l, [x_low, x_high], x, t, next), span(l, [y_low, y_high], y, t, next));
                 let lowest = l.add(z, l.min(l.mul(z_low, t), l.mul(z_low, next)));
                 let coarser = l.imin(l.iadd(level, one), l.int(scene.top));
                 let (x0, x1) = (node(l, scene, 0, x0, coarser), node(l, scene, 0, x1, coarser));
@@ -182,8 +181,10 @@ impl<'a> ViewRays<'a> {
                 let (south, north) = (l.iadd(offset, l.imul(y0, stride)), l.iadd(offset, l.imul(y1, stride)));
                 // SAFETY: nodes are clamped to the raster's, at levels 1 to the top.
                 let (south_high, north_high) = unsafe {
-                    let west = (l.gather_u16(scene.highs, l.iadd(south, x0)), l.gather_u16(scene.highs, l.iadd(north, x0)));
-                    let east = (l.gather_u16(scene.highs, l.iadd(south, x1)), l.gather_u16(scene.highs, l.iadd(north, x1)));
+                    let west =
+                        (l.gather_u16(scene.highs, l.iadd(south, x0)), l.gather_u16(scene.highs, l.iadd(north, x0)));
+                    let east =
+                        (l.gather_u16(scene.highs, l.iadd(south, x1)), l.gather_u16(scene.highs, l.iadd(north, x1)));
                     (l.imax(west.0, east.0), l.imax(west.1, east.1))
                 };
                 let high = l.imax(south_high, north_high);

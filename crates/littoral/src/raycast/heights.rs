@@ -34,7 +34,10 @@ impl Land {
     pub fn par_heights_at(&self, places: &[DVec2], heights: &mut [f32]) {
         assert_eq!(places.len(), heights.len(), "expected as many heights as places");
         let part = super::bulk::PART;
-        places.par_chunks(part).zip(heights.par_chunks_mut(part)).for_each(|(places, heights)| self.heights_at(places, heights));
+        places
+            .par_chunks(part)
+            .zip(heights.par_chunks_mut(part))
+            .for_each(|(places, heights)| self.heights_at(places, heights));
     }
 }
 

@@ -460,9 +460,11 @@ impl<L: Lanes> Packet<L> {
         if SHEET {
             // What counts is the crossing, not the rounded position.
             follow_x = l.iselect(l.lt(leave, lines_x.crossing(l, follow_x)), l.isub(follow_x, one), follow_x);
-            follow_x = l.iselect(l.le(lines_x.crossing(l, l.iadd(follow_x, one)), leave), l.iadd(follow_x, one), follow_x);
+            follow_x =
+                l.iselect(l.le(lines_x.crossing(l, l.iadd(follow_x, one)), leave), l.iadd(follow_x, one), follow_x);
             follow_y = l.iselect(l.lt(leave, lines_y.crossing(l, follow_y)), l.isub(follow_y, one), follow_y);
-            follow_y = l.iselect(l.le(lines_y.crossing(l, l.iadd(follow_y, one)), leave), l.iadd(follow_y, one), follow_y);
+            follow_y =
+                l.iselect(l.le(lines_y.crossing(l, l.iadd(follow_y, one)), leave), l.iadd(follow_y, one), follow_y);
         }
         let follow_x = l.imax(l.imin(follow_x, l.imin(self.last_x, l.isub(next_x, one))), self.cell_x);
         let follow_y = l.imax(l.imin(follow_y, l.imin(self.last_y, l.isub(next_y, one))), self.cell_y);
