@@ -42,7 +42,7 @@ pub fn compose(land: &Land, water: Option<&Water>, size: UVec2) -> Shot {
     }
     let ground = Ground::new(land, water);
     let candidates = candidates(land, water, ground.has_standing());
-    let small = UVec2::new(24, (24 * size.y.max(1)).div_ceil(size.x.max(1)).clamp(8, 48));
+    let small = UVec2::new(20, (20 * size.y.max(1)).div_ceil(size.x.max(1)).clamp(8, 40));
     let mut judged: Vec<(f64, usize)> =
         candidates.par_iter().enumerate().map(|(i, c)| (judge(&ground, water, c, small), i)).collect();
     // Best first; ties by number, so that the answer is the same everywhere.
@@ -115,7 +115,7 @@ impl Camera {
 
 /// Eyes over a lattice of places within the land (and around it, where that is sea), at several heights.
 fn candidates(land: &Land, water: Option<&Water>, standing: bool) -> Vec<Camera> {
-    const PLACES: i32 = 9;
+    const PLACES: i32 = 7;
     const BEARINGS: usize = 12;
     let extent = land.extent();
     let reach = extent.min_element();
@@ -123,7 +123,7 @@ fn candidates(land: &Land, water: Option<&Water>, standing: bool) -> Vec<Camera>
     let range = land.height_range();
     let relief = f64::from(range.high - range.low);
     let island = water.is_some_and(|w| w.reaches_horizon() && w.share() > 0.3);
-    let (first, last) = if island { (-3, PLACES + 3) } else { (0, PLACES) };
+    let (first, last) = if island { (-2, PLACES + 2) } else { (0, PLACES) };
     let mut cameras = Vec::new();
     for (i, j) in (first..=last).flat_map(|j| (first..=last).map(move |i| (i, j))) {
         let f = DVec2::new(f64::from(i), f64::from(j)) / f64::from(PLACES);

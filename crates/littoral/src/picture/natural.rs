@@ -164,8 +164,9 @@ pub fn natural(
         albedo = albedo.lerp(albedo * (0.30 + 0.45 * albedo), wet * (0.35 + 0.65 * sand.max(rock)));
     }
     if above < 0.0 {
-        let grown = step(0.02, 0.48, 0.55 * middle + 0.5 * wide + 0.22 * patch(plain, 14.0, footprint, 12) + 0.2 * fine)
-            * step(-1.2, -4.5, above);
+        let grown =
+            step(0.02, 0.48, 0.55 * middle + 0.5 * wide + 0.22 * patch(plain, 14.0, footprint, 12) + 0.2 * fine)
+                * step(-1.2, -4.5, above);
         albedo = SAND.lerp(COOL_ROCK * 0.6, rock).lerp(SEAGRASS, grown * 0.85) * (1.0 + 0.12 * fine);
         wet = 0.0;
     }
