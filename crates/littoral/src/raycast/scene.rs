@@ -72,15 +72,6 @@ impl<'a> Scene<'a> {
             height: anchor.z as f32,
             low: range.low - hair - 1e-3,
             high: range.high + hair + 1e-3,
-<<<<<<< HEAD
-=======
-            tune: std::env::var("TUNE")
-                .map(|t| {
-                    let v: Vec<i32> = t.split(',').map(|x| x.parse().unwrap()).collect();
-                    std::array::from_fn(|i| v[i])
-                })
-                .unwrap_or([4, 6, 1, 99, 5, 0, 0, 0]),
->>>>>>> picture
         })
     }
 
