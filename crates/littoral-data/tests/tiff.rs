@@ -214,7 +214,8 @@ impl Maker {
         for plane in planes {
             for index in 0..across * down {
                 if self.sparse.contains(&index) {
-                    (offsets.push(0), counts.push(0));
+                    offsets.push(0);
+                    counts.push(0);
                     continue;
                 }
                 let chunk = self.chunk(index % across, index / across, plane);
@@ -230,7 +231,7 @@ impl Maker {
         let short = |values: &[u16]| {
             (3u16, values.iter().flat_map(|value| self.bytes(value.to_le_bytes())).collect::<Vec<u8>>(), values.len())
         };
-        let mut tags: Vec<(u16, (u16, Vec<u8>, usize))> = vec![
+        let mut tags: Vec<(u16, Values)> = vec![
             (256, long(&[self.columns])),
             (257, long(&[self.rows])),
             (258, short(&vec![self.kind.1; self.bands])),
@@ -270,6 +271,9 @@ impl Maker {
         (at, at + table.len())
     }
 }
+
+/// A tag's type, its values in the file's byte order, and how many they are.
+type Values = (u16, Vec<u8>, usize);
 
 fn open(bytes: Vec<u8>) -> Box<dyn Source> {
     tiff::open_input(Input::memory("made.tif", bytes)).expect("opens")

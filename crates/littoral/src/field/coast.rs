@@ -43,7 +43,7 @@ pub fn view(size: UVec2) -> View {
 
 /// Bearing and elevation of the sun that suits [`view`] (rad).
 pub fn sun() -> (f64, f64) {
-    (257f64.to_radians(), 17f64.to_radians())
+    (254f64.to_radians(), 14f64.to_radians())
 }
 
 /// How far inland a place lies (m), by the outline drawn by hand, bent by noise; negative at sea.
@@ -52,7 +52,9 @@ fn inland(at: DVec2) -> f64 {
     let p = at + DVec2::new(bend(11), bend(61));
     // The shore as the height of land over x: a lesser cape in the west, a wide bay, a headland in the east.
     let bump = |middle: f64, width: f64| (-((p.x - middle) / width).powi(2)).exp();
-    let line = 2000.0 - 1150.0 * bump(3750.0, 430.0) + 400.0 * bump(2500.0, 620.0) - 620.0 * bump(1050.0, 480.0) - 150.0 * bump(5100.0, 700.0);
+    let line = 2000.0 - 1150.0 * bump(3750.0, 430.0) + 400.0 * bump(2500.0, 620.0)
+        - 620.0 * bump(1050.0, 480.0)
+        - 150.0 * bump(5100.0, 700.0);
     p.y - line
 }
 
@@ -86,10 +88,9 @@ fn hills() -> Carving {
     };
     land.drain();
     land.carve(&Law { rivers: 0.030, uplift: 1.5, creep: 60.0 }, &rises(land.side), 60);
-    for (steps, law) in [
-        (14, Law { rivers: 0.030, uplift: 1.5, creep: 25.0 }),
-        (6, Law { rivers: 0.022, uplift: 1.2, creep: 7.0 }),
-    ] {
+    for (steps, law) in
+        [(14, Law { rivers: 0.030, uplift: 1.5, creep: 25.0 }), (6, Law { rivers: 0.022, uplift: 1.2, creep: 7.0 })]
+    {
         land = land.finer();
         land.drain();
         land.carve(&law, &rises(land.side), steps);
@@ -112,7 +113,8 @@ impl Shore {
         let land: Vec<bool> = carved.heights.iter().map(|h| *h > 0.0).collect();
         let to_sea = distances(&land, carved.side);
         let to_land = distances(&land.iter().map(|l| !l).collect::<Vec<_>>(), carved.side);
-        let inland = to_sea.iter().zip(&to_land).map(|(sea, land)| (sea - land) * carved.spacing).collect();
+        let inland: Vec<f32> = to_sea.iter().zip(&to_land).map(|(sea, land)| (sea - land) * carved.spacing).collect();
+        let inland = rounded(&rounded(&inland, carved.side), carved.side);
         Shore { side: carved.side, spacing: f64::from(carved.spacing), hills: carved.heights.clone(), inland }
     }
 
@@ -143,9 +145,10 @@ impl Shore {
         // Waves have taken the foot of open hills: what is left ends in a cliff above a platform of rock.
         let crags = Fbm::new(46.0, 5.0, 4, 35).at(at).value;
         let retreat = 62.0 + 0.5 * ragged;
-        let face = smooth(retreat - 8.0, retreat + 12.0, d + crags);
+        let face = smooth(retreat - 7.0, retreat + 10.0, d + 2.2 * crags);
         let top = hill + crags * smooth(20.0, 120.0, hill) + 1.0;
-        let platform = (bed - 0.4).min(-0.6 - 0.02 * (retreat - d).max(0.0)) + 1.5 * crags.max(-0.8) * smooth(110.0, 50.0, (d - retreat).abs());
+        let platform = (bed - 0.4).min(-0.6 - 0.02 * (retreat - d).max(0.0))
+            + 0.9 * Fbm::new(30.0, 5.0, 3, 36).at(at).value.max(-0.5) * smooth(110.0, 50.0, (d - retreat).abs());
         let cliff = platform + (top - platform) * face;
         let open = if d > -200.0 { cliff } else { bed };
         let sheltered = if d > 0.0 { gentle.min(hill.max(beach)) } else { bed };
@@ -178,7 +181,12 @@ impl Shore {
 
     /// Rocks off the headland.
     fn skerries(&self, at: DVec2) -> f64 {
-        let rocks = [(3040.0, 1290.0, 40.0, 26.0), (3110.0, 1220.0, 26.0, 9.0), (2960.0, 1390.0, 22.0, 5.0), (1790.0, 1010.0, 60.0, 14.0)];
+        let rocks = [
+            (3040.0, 1290.0, 40.0, 26.0),
+            (3110.0, 1220.0, 26.0, 9.0),
+            (2960.0, 1390.0, 22.0, 5.0),
+            (1790.0, 1010.0, 60.0, 14.0),
+        ];
         let mut best = f64::NEG_INFINITY;
         for (i, (x, y, radius, height)) in rocks.into_iter().enumerate() {
             let away = at - DVec2::new(x, y);
@@ -186,7 +194,9 @@ impl Shore {
                 let bend = Fbm::new(55.0, 26.0, 4, 60 + i as u32).at(at).value;
                 let r = (away.length() + bend) / radius;
                 let crag = Fbm::new(24.0, 5.0, 4, 70 + i as u32).at(at).value;
-                best = best.max((height + crag) * smooth(1.15, 0.55, r) - 60.0 * smooth(0.7, 6.0, r) - 3.0 * smooth(0.8, 1.2, r));
+                best = best.max(
+                    (height + crag) * smooth(1.15, 0.55, r) - 60.0 * smooth(0.7, 6.0, r) - 3.0 * smooth(0.8, 1.2, r),
+                );
             }
         }
         best
@@ -199,7 +209,12 @@ impl Shore {
         let f = p - base;
         let weights = |t: f64| {
             let (t2, t3) = (t * t, t * t * t);
-            [0.5 * (-t + 2.0 * t2 - t3), 0.5 * (2.0 - 5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
+            [
+                0.5 * (-t + 2.0 * t2 - t3),
+                0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
+                0.5 * (t + 4.0 * t2 - 3.0 * t3),
+                0.5 * (t3 - t2),
+            ]
         };
         let (wx, wy) = (weights(f.x), weights(f.y));
         let (x, y) = (base.x as usize, base.y as usize);
@@ -214,27 +229,60 @@ impl Shore {
     }
 }
 
-/// Distance in samples, by chamfers, from each true sample to the nearest false one; 0 at false ones.
+/// Distance in samples from each true sample to the nearest false one, found by handing on the offset to it in two sweeps
+/// (P.-E. Danielsson, "Euclidean distance mapping", 1980); 0 at false ones.
 fn distances(inside: &[bool], side: usize) -> Vec<f32> {
-    const DIAGONAL: f32 = std::f32::consts::SQRT_2;
-    let mut d: Vec<f32> = inside.iter().map(|&i| if i { 1e6 } else { 0.0 }).collect();
-    for pass in 0..2 {
+    const FAR: i32 = 20_000;
+    let length = |(x, y): (i32, i32)| x * x + y * y;
+    let mut offsets: Vec<(i32, i32)> = inside.iter().map(|&i| if i { (FAR, FAR) } else { (0, 0) }).collect();
+    let back: [(isize, isize); 4] = [(-1, 0), (0, -1), (-1, -1), (1, -1)];
+    for sign in [1, -1] {
         for k in 0..side * side {
-            let at = if pass == 0 { k } else { side * side - 1 - k };
+            let at = if sign == 1 { k } else { side * side - 1 - k };
             let (x, y) = (at % side, at / side);
-            let mut best = d[at];
-            let steps: [(isize, isize, f32); 4] = [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, DIAGONAL), (1, -1, DIAGONAL)];
-            for (dx, dy, length) in steps {
-                let sign = if pass == 0 { 1 } else { -1 };
+            let mut best = offsets[at];
+            for (dx, dy) in back {
                 let (nx, ny) = (x.wrapping_add_signed(sign * dx), y.wrapping_add_signed(sign * dy));
                 if nx < side && ny < side {
-                    best = best.min(d[ny * side + nx] + length);
+                    let (ox, oy) = offsets[ny * side + nx];
+                    let through = (ox + (sign * dx) as i32, oy + (sign * dy) as i32);
+                    if length(through) < length(best) {
+                        best = through;
+                    }
                 }
             }
-            d[at] = best;
+            offsets[at] = best;
+        }
+        // A second look along the rows reaches what lies on the other side.
+        for k in 0..side * side {
+            let at = if sign == 1 { side * side - 1 - k } else { k };
+            let next = (at % side).wrapping_add_signed(sign);
+            if next < side {
+                let (ox, oy) = offsets[at - at % side + next];
+                let through = (ox + sign as i32, oy);
+                if length(through) < length(offsets[at]) {
+                    offsets[at] = through;
+                }
+            }
         }
     }
-    d
+    offsets.into_iter().map(|o| (length(o) as f32).sqrt()).collect()
+}
+
+/// Rounds the stairs of a grid by averaging each value with its neighbours.
+fn rounded(values: &[f32], side: usize) -> Vec<f32> {
+    let mean = |i: usize| {
+        let (x, y) = (i % side, i / side);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for r in y.saturating_sub(1)..(y + 2).min(side) {
+            for c in x.saturating_sub(1)..(x + 2).min(side) {
+                sum += values[r * side + c];
+                count += 1.0;
+            }
+        }
+        sum / count
+    };
+    (0..side * side).into_par_iter().map(mean).collect()
 }
 
 /// A smooth step from 0 at `from` to 1 at `to`, either way round.

@@ -149,7 +149,8 @@ impl Atmosphere {
             let end = ground.unwrap_or_else(|| distance_to_shell(r, mu, EARTH + TOP));
             let mut through = Spectrum::splat(1.0);
             for step in 0..STEPS {
-                let (t0, t1) = (end * (step as f32 / STEPS as f32).powi(2), end * ((step + 1) as f32 / STEPS as f32).powi(2));
+                let (t0, t1) =
+                    (end * (step as f32 / STEPS as f32).powi(2), end * ((step + 1) as f32 / STEPS as f32).powi(2));
                 let t = 0.5 * (t0 + t1);
                 let height = height_along(r, mu, t);
                 let up = (Vec3::Z * r + direction * t).normalize();

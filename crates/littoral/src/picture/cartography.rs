@@ -11,6 +11,7 @@
 
 use super::ground::Ground;
 use super::texture::decode_srgb;
+use crate::field::HeightRange;
 use glam::{DVec2, Vec2, Vec3};
 
 /// Stops of colour: position in [0, 1], hue (degrees), saturation, lightness.
@@ -43,9 +44,29 @@ pub struct Tints {
     pub high: f32,
     /// Level of the water (m), or below everything.
     pub level: f32,
+    /// Root mean square of the slopes of a shape as large as the eye picks out.
+    pub slope: f32,
 }
 
 impl Tints {
+    /// The range and the slopes of a ground.
+    pub fn of(ground: &Ground, range: HeightRange, level: f32) -> Tints {
+        const SIDE: usize = 48;
+        let (origin, extent) = (ground.land.origin(), ground.land.extent());
+        let footprint = (extent.max_element() / 160.0) as f32;
+        let (mut squares, mut count) = (0.0f64, 0.0f64);
+        for i in 0..SIDE * SIDE {
+            let f = DVec2::new((i % SIDE) as f64 + 0.5, (i / SIDE) as f64 + 0.5) / SIDE as f64;
+            let at = origin + extent * f;
+            if ground.known(at) > 0.5 {
+                squares += f64::from(ground.surface(at, footprint).slope.length_squared());
+                count += 1.0;
+            }
+        }
+        let slope = (squares / count.max(1.0)).sqrt().max(1e-5) as f32;
+        Tints { low: range.low, high: range.high, level, slope }
+    }
+
     /// Albedo (linear) of ground at a height (m); `wet` says whether water lies over it where it is below the level.
     pub fn colour(&self, height: f32, wet: bool) -> Vec3 {
         if wet && height < self.level {
@@ -88,8 +109,7 @@ pub fn relief(ground: &Ground, tints: &Tints, at: DVec2, height: f32, footprint:
     // Slopes of three sizes; the scale of heights is chosen so that a typical slope is a good grey.
     let size = ground.spacing().max(footprint);
     let extent = ground.land.extent().min_element() as f32;
-    let typical = ((tints.high - tints.low) / extent * 7.0).clamp(0.002, 0.7);
-    let exaggeration = 0.42 / typical;
+    let exaggeration = 0.45 / tints.slope;
     let mut slope = Vec2::ZERO;
     for (scale, weight) in [(1.0, 0.50), (5.0, 0.32), (18.0, 0.18)] {
         slope += ground.surface(at, (size * scale).min(0.05 * extent)).slope * weight;
@@ -116,7 +136,7 @@ pub fn relief(ground: &Ground, tints: &Tints, at: DVec2, height: f32, footprint:
     let tone = ((shade - 0.64) / 0.36).clamp(-1.8, 1.0) * contrast;
     let paper = match below {
         true => hsl(204.0, 0.42, 0.70 + 0.16 * elevation),
-        false => hsl(78.0, 0.16, 0.80).lerp(hsl(44.0, 0.42, 0.90), elevation.powf(0.7)),
+        false => hsl(86.0, 0.17, 0.76).lerp(hsl(42.0, 0.46, 0.87), elevation.powf(0.7)),
     };
     if tone > 0.0 {
         paper.lerp(hsl(50.0, 0.85, 0.95), tone.min(1.0) * 0.75)
@@ -135,7 +155,7 @@ mod tests {
 
     #[test]
     fn tints_break_at_the_water_line_and_nowhere_else() {
-        let tints = Tints { low: -100.0, high: 900.0, level: 0.0 };
+        let tints = Tints { low: -100.0, high: 900.0, level: 0.0, slope: 0.1 };
         let jump = |a: f32, b: f32, wet| (tints.colour(a, wet) - tints.colour(b, wet)).length();
         assert!(jump(-0.01, 0.01, true) > 0.2, "the shore is a line");
         assert!(jump(-0.01, 0.01, false) < 0.01, "a polder is land");

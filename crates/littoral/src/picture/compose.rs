@@ -195,7 +195,13 @@ fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -
             let known = f64::from(ground.known(at.truncate()));
             if known < 0.5 || normal.dot(ray.direction) > 0.0 {
                 // What is near and missing hurts; a rim of mist on the horizon does not.
-                missing += if distance < 0.15 * extent { 4.0 } else if distance < 0.5 * extent { 1.0 } else { 0.35 };
+                missing += if distance < 0.15 * extent {
+                    4.0
+                } else if distance < 0.5 * extent {
+                    1.0
+                } else {
+                    0.35
+                };
                 continue;
             }
             let shade = f64::from(normal.dot(sun).max(0.0));
@@ -220,7 +226,8 @@ fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -
     let spread = |sum: f64, squares: f64| (squares / count.max(1.0) - (sum / count.max(1.0)).powi(2)).max(0.0).sqrt();
     let (contrast, layers) = (spread(lit, lit2), spread(deep, deep2));
     let mean = skyline.iter().sum::<f64>() / skyline.len() as f64;
-    let shape = (skyline.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / skyline.len() as f64).sqrt() / f64::from(size.y);
+    let shape =
+        (skyline.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / skyline.len() as f64).sqrt() / f64::from(size.y);
     let within = |value: f64, best: f64, width: f64| (-((value - best) / width).powi(2)).exp();
     1.6 * (contrast / 0.22).min(1.4)
         + 0.9 * (layers / 0.7).min(1.2)
@@ -232,4 +239,3 @@ fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -
         - 3.0 * (0.12 - land_share).max(0.0) / 0.12
         - 1.5 * (1.0 - nearest / (0.10 * extent)).max(0.0)
 }
-

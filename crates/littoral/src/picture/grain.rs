@@ -111,7 +111,8 @@ mod tests {
             let at = DVec3::new(t * 0.754_877 - 7e3, t * 0.569_840, 13.0 - t * 0.3141);
             let here = grain(at, 3);
             let difference = |by: DVec3| (grain(at + by, 3).value - grain(at - by, 3).value) / 2e-2;
-            let expected = Vec3::new(difference(DVec3::X * 1e-2), difference(DVec3::Y * 1e-2), difference(DVec3::Z * 1e-2));
+            let expected =
+                Vec3::new(difference(DVec3::X * 1e-2), difference(DVec3::Y * 1e-2), difference(DVec3::Z * 1e-2));
             assert!((here.gradient - expected).length() < 0.02, "{} for {expected}", here.gradient);
             most = most.max(here.value.abs());
             squares += here.value * here.value;

@@ -87,7 +87,8 @@ pub fn natural(
     let plain = DVec3::new(at.x, at.y, 0.35 * at.z);
     let wide = patch(plain, 620.0, footprint, 1) + 0.6 * patch(plain, 260.0, footprint, 2);
     let middle = patch(plain, 74.0, footprint, 3) + 0.6 * patch(plain, 31.0, footprint, 4);
-    let fine = patch(plain, 9.0, footprint, 5) + 0.7 * patch(plain, 3.1, footprint, 6) + 0.5 * patch(plain, 0.9, footprint, 7);
+    let fine =
+        patch(plain, 9.0, footprint, 5) + 0.7 * patch(plain, 3.1, footprint, 6) + 0.5 * patch(plain, 0.9, footprint, 7);
     let moist = (broad.hollow * spacing.max(8.0) * 9.0).clamp(-1.0, 1.0);
     let height = at.z as f32;
     let alpine = step(climate.tree_line - 350.0, climate.tree_line + 450.0, height + 180.0 * middle + 120.0 * wide);
@@ -125,11 +126,25 @@ pub fn natural(
     let washed = (1.0 - step(2.0, 5.0, above + 2.5 * middle)) * step(0.16, 0.34, steep.max(broad.slope.length()));
     let rock = step(0.68, 1.05, rough_steep * (1.0 + 0.60 * blunt) + 0.15 * fine).max(washed);
     if rock > 0.0 {
-        let bed = 0.5 + 1.1 * patch(DVec3::new(at.x * 0.06, at.y * 0.06, at.z + 0.05 * at.x), 3.5, 0.4 * footprint, 10)
-            + 0.5 * patch(DVec3::new(at.x * 0.2, at.y * 0.2, at.z), 0.9, footprint, 11);
-        let stone = COOL_ROCK.lerp(WARM_ROCK, (bed + 0.5 * middle).clamp(0.0, 1.0)) * (1.0 + 0.30 * pits + 0.25 * fine);
+        // Beds of harder and softer stone, hardly tilted, and joints that run down through them.
+        let cliff = step(0.9, 1.7, steep * (1.0 + 0.5 * blunt));
+        let tall = (spacing / 4.0).max(1.0);
+        let level = f64::from(tall);
+        let beds = DVec3::new(at.x * 0.05, at.y * 0.05, at.z + 0.06 * at.x + 0.03 * at.y) / level;
+        let bed = patch(beds, 13.0, footprint / tall, 10)
+            + 0.6 * patch(beds, 4.1, footprint / tall, 11)
+            + 0.35 * patch(beds, 1.3, footprint / tall, 13);
+        let joint_at = DVec3::new(at.x, at.y, 0.16 * at.z) / (8.5 * level);
+        let split = resolved(8.5 * tall, footprint) * cliff;
+        let joints = grain(joint_at, 14);
+        let crack = split * step(0.16, 0.0, joints.value.abs());
+        let lean = joints.gradient * Vec3::new(0.42, 0.42, 0.07) * split;
+        shaded = (shaded - (lean - normal * lean.dot(normal)) * rock).normalize();
+        let warm = (0.45 + 0.9 * bed + 0.45 * middle).clamp(0.0, 1.0);
+        let stone =
+            COOL_ROCK.lerp(WARM_ROCK, warm) * (1.0 + 0.32 * pits + 0.20 * fine + 0.30 * bed * cliff - 0.38 * crack);
         albedo = albedo.lerp(stone, rock);
-        openness *= 1.0 - 0.15 * rock * (0.5 - pits).clamp(0.0, 1.0);
+        openness *= 1.0 - rock * (0.15 * (0.5 - pits).clamp(0.0, 1.0) + 0.45 * crack);
     }
 
     // The shore.
@@ -149,7 +164,8 @@ pub fn natural(
         albedo = albedo.lerp(albedo * (0.30 + 0.45 * albedo), wet * (0.35 + 0.65 * sand.max(rock)));
     }
     if above < 0.0 {
-        let grown = step(0.12, 0.34, 0.7 * middle + 0.5 * wide + 0.2 * fine) * step(-1.2, -4.0, above);
+        let grown = step(0.02, 0.48, 0.55 * middle + 0.5 * wide + 0.22 * patch(plain, 14.0, footprint, 12) + 0.2 * fine)
+            * step(-1.2, -4.5, above);
         albedo = SAND.lerp(COOL_ROCK * 0.6, rock).lerp(SEAGRASS, grown * 0.85) * (1.0 + 0.12 * fine);
         wet = 0.0;
     }
@@ -182,7 +198,8 @@ fn stands(
     let twigs = grain(at / 0.6, 21);
     let (near, nearer) = (resolved(1.7, footprint), resolved(0.6, footprint));
     let shaken = leaves.gradient * (0.6 * near) + twigs.gradient * (0.4 * nearer);
-    let tree = WOODS * (1.5 + 0.9 * patch(plain, 21.0, footprint, 22) + 0.5 * near * leaves.value + 0.5 * nearer * twigs.value);
+    let tree = WOODS
+        * (1.5 + 0.9 * patch(plain, 21.0, footprint, 22) + 0.5 * near * leaves.value + 0.5 * nearer * twigs.value);
     let kind = patch(plain, 46.0, 0.1, 23) + 0.5 * patch(plain, 17.0, 0.1, 24);
     let roof = ROOF_TILES.lerp(ROOF_SLATE, step(-0.02, 0.06, kind)) * (1.0 + 0.15 * patch(at, 2.0, footprint, 25));
     let wall = step(1.3, 2.4, surface.slope.length());

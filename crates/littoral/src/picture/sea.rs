@@ -109,7 +109,9 @@ pub fn ripples(at: DVec2, footprint: f32) -> Ripples {
     // Gusts and lanes: the same breeze does not touch all of the water.
     let plane = at.extend(0.0);
     let along = DVec3::new(plane.x * 0.8 + plane.y * 0.6, (plane.y * 0.8 - plane.x * 0.6) * 2.6, 0.0);
-    let lanes = patch(along, 700.0, footprint, 40) + 0.7 * patch(along, 190.0, footprint, 41) + 0.4 * patch(along, 47.0, footprint, 44);
+    let lanes = patch(along, 700.0, footprint, 40)
+        + 0.7 * patch(along, 190.0, footprint, 41)
+        + 0.4 * patch(along, 47.0, footprint, 44);
     let strength = (0.85 + 1.1 * lanes).clamp(0.25, 1.8);
     let mut slope = Vec2::ZERO;
     let mut variance = 4.0e-4;
@@ -141,7 +143,8 @@ pub fn glitter(eye: Vec3, sun: Vec3, ripples: &Ripples) -> f32 {
         return 0.0;
     }
     let slope = Vec2::new(-half.x, -half.y) / half.z - ripples.slope;
-    let density = (-0.5 * slope.length_squared() / ripples.variance).exp() / (2.0 * std::f32::consts::PI * ripples.variance);
+    let density =
+        (-0.5 * slope.length_squared() / ripples.variance).exp() / (2.0 * std::f32::consts::PI * ripples.variance);
     fresnel(eye.dot(half)) * density / (4.0 * eye.z.max(0.03) * half.z.powi(4))
 }
 

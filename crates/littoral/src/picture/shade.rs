@@ -1,5 +1,6 @@
 //! From what a ray meets to the light it brings.
 
+use super::Style;
 use super::atmosphere::Veil;
 use super::cartography::relief;
 use super::grain::step;
@@ -9,7 +10,6 @@ use super::sampler::Sampler;
 use super::sea::{Ripples, fresnel, glitter, refract, ripples};
 use super::skylight::irradiance;
 use super::stage::{HIGHEST_EYE, Lens, Stage, purpose};
-use super::Style;
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -156,7 +156,7 @@ impl Stage<'_> {
     /// Width of a pixel at a distance on something whose normal makes this cosine with the eye (m). Slanted pixels are long; the samples
     /// within them see to that in part.
     fn footprint(&self, lens: &Lens, distance: f32, cosine: f32) -> f32 {
-        (distance * lens.pixel * (1.0 / cosine.max(0.02)).sqrt() * 0.8).max(1e-4)
+        (distance * lens.pixel * (1.0 / cosine.max(0.02)).sqrt() * 0.65).max(1e-4)
     }
 
     /// A direction to a random point of the sun's disc.
@@ -227,7 +227,9 @@ impl Stage<'_> {
         // Slopes that turn from the sun hide their own relief from it.
         let facing = material.normal.dot(self.sun).max(0.0) * step(-0.02, 0.12, smooth.dot(self.sun));
         let sunlit = match facing > 0.0 {
-            true => material.albedo / PI * self.air.sunlight(position.z as f32) * (facing * (0.4 + 0.6 * material.openness)),
+            true => {
+                material.albedo / PI * self.air.sunlight(position.z as f32) * (facing * (0.4 + 0.6 * material.openness))
+            }
             false => Vec3::ZERO,
         };
         Facet { smooth, skylit, sunlit }
@@ -300,7 +302,8 @@ impl Stage<'_> {
             ..Shaded::default()
         };
         if self.sun.z > 0.0 {
-            shaded.sunlit = pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &pool.ripples) * film);
+            shaded.sunlit =
+                pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &pool.ripples) * film);
             shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
         }
         if pool.open < 1.0 {
@@ -386,7 +389,8 @@ impl Stage<'_> {
         let spacing = self.ground.spacing();
         let surface = self.ground.surface(at, 2.0 * spacing);
         let material = self.material(position, &surface, 2.0 * spacing);
-        let sun = self.air.sunlight(position.z as f32) * (material.normal.dot(self.sun).max(0.0) * self.skylight.sunny(at));
+        let sun =
+            self.air.sunlight(position.z as f32) * (material.normal.dot(self.sun).max(0.0) * self.skylight.sunny(at));
         let sky = irradiance(&self.skylight.at(at), material.normal) * material.openness;
         let light = self.mist.lerp(material.albedo / PI * (sun + sky), known);
         if !self.scene.air.veils_distance {

@@ -69,12 +69,20 @@ impl Skylight {
         let sent: Vec<Vec3> = horizons
             .iter()
             .map(|h| {
-                let seen = h.ring.iter().map(|r| 1.0 - step_elevation(r.0).max(0.0).sin()).sum::<f32>() / DIRECTIONS as f32;
+                let seen =
+                    h.ring.iter().map(|r| 1.0 - step_elevation(r.0).max(0.0).sin()).sum::<f32>() / DIRECTIONS as f32;
                 air.sunlight(h.height) * (h.normal.dot(sun).max(0.0) * h.sunny) + sky_up * seen
             })
             .collect();
-        let mut grid =
-            Skylight { origin, step, columns, rows, lights: Vec::new(), sunny: horizons.iter().map(|h| h.sunny).collect(), open };
+        let mut grid = Skylight {
+            origin,
+            step,
+            columns,
+            rows,
+            lights: Vec::new(),
+            sunny: horizons.iter().map(|h| h.sunny).collect(),
+            open,
+        };
         grid.lights = (0..columns * rows)
             .into_par_iter()
             .map(|i| {
@@ -190,7 +198,8 @@ impl Tables {
                 let middle = step_elevation(s as f32 + 0.5);
                 let (z, c) = middle.sin_cos();
                 let toward = Vec3::new(flat.x * c, flat.y * c, z);
-                let solid = (2.0 * PI / DIRECTIONS as f32) * (step_elevation((s + 1) as f32).sin() - step_elevation(s as f32).sin());
+                let solid = (2.0 * PI / DIRECTIONS as f32)
+                    * (step_elevation((s + 1) as f32).sin() - step_elevation(s as f32).sin());
                 // Below the level horizon and yet unhidden lies far land or sea under haze: darker than the sky above it.
                 let radiance = match middle > 0.0 {
                     true => sky.radiance(toward),

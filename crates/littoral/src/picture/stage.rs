@@ -68,7 +68,7 @@ impl<'a> Stage<'a> {
         let skylight = Skylight::new(&ground, &air, &sky, sun, Vec3::new(0.150, 0.130, 0.090));
         let open = irradiance(&skylight.open, Vec3::Z);
         let mist = 0.42 / std::f32::consts::PI * (air.sunlight(middle.max(0.0)) * sun.z.max(0.0) + open);
-        let tints = Tints { low: range.low, high: range.high, level };
+        let tints = Tints::of(&ground, range, level);
         Stage { scene: *scene, tints, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
     }
 
