@@ -211,7 +211,7 @@ fn neighbours(i: usize, side: usize) -> impl Iterator<Item = (usize, f32)> {
     ];
     AROUND.into_iter().filter_map(move |(dx, dy, distance)| {
         let (nx, ny) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
-        (nx < side && ny < side).then_some((ny * side + nx, distance))
+        (nx < side && ny < side).then(|| (ny * side + nx, distance))
     })
 }
 
