@@ -55,19 +55,12 @@ struct General {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Make a picture, or with --path a film
     Render(Box<render::Render>),
-    /// Say what a file is: format, size, heights, coordinates, and what is assumed
     Info(info::Info),
-    /// Exact heights at points
     Height(height::Height),
-    /// Heights along a line, as CSV or a plot
     Profile(profile::Profile),
-    /// Line of sight between two points
     Sight(sight::Sight),
-    /// What can be seen from a point, as a GeoTIFF
     Viewshed(viewshed::Viewshed),
-    /// Measure the speed of this machine and this version
     Bench(bench::Bench),
 }
 

@@ -24,7 +24,7 @@ use std::time::Instant;
   littoral render dem.tif                                  your land, from a view chosen by itself
   littoral render dem.tif --sun 240,12 --size 1920x1080 --out evening.png
   littoral render dem.tif --eye 562300,5107000,3200 --look 562300,5115800,1900
-  littoral render dem.tif --eye 562300,5107000,2 --look 562300,5115800 --above
+  littoral render dem.tif --eye 562300,5109500,2 --look 562300,5115800 --above
   littoral render dem.tif --style image --texture ortho.tif
   littoral render dem.tif --out linear.exr --passes depth,normal
   littoral render dem.tif --path                           a film: once round the land
@@ -57,7 +57,7 @@ pub struct Render {
     /// Coordinates are longitude and latitude in degrees
     #[arg(long, help_heading = "View")]
     lonlat: bool,
-    /// Angle between the picture's lower and upper edge in degrees
+    /// Angle between the picture's lower and upper edge in degrees [default: 45, or what suits a chosen view]
     #[arg(long, value_name = "DEGREES", value_parser = input::field_of_view, help_heading = "View")]
     fov: Option<f64>,
 
