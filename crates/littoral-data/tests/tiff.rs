@@ -122,12 +122,8 @@ impl Maker {
                 encoder.finish().expect("encodes")
             }
             34887 => {
-                let numbers: Vec<f32> = raw
-                    .as_chunks::<4>()
-                    .0
-                    .iter()
-                    .map(|b| if self.little { f32::from_le_bytes(*b) } else { f32::from_be_bytes(*b) })
-                    .collect();
+                // As libtiff: bytes of the file's order taken for native numbers.
+                let numbers: Vec<f32> = raw.as_chunks::<4>().0.iter().map(|bytes| f32::from_ne_bytes(*bytes)).collect();
                 lerc::encode_slice(self.chunk[0] as u32, rows as u32, &numbers, lerc::Precision::Lossless)
                     .expect("encodes")
             }
