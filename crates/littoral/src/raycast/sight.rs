@@ -16,6 +16,9 @@ use std::cell::Cell;
 /// blocked. Heights are `f32`, whose steps are 0.5 mm at 8000 m: less would only measure rounding.
 pub const GRAZE: f64 = 1e-3;
 
+/// How many strips of a line are looked at before the others: more cost more than they spare.
+const PROBES: i64 = 16;
+
 /// A point some way above the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
@@ -214,13 +217,26 @@ impl Land {
             let matters = if blocked_at.get().is_some() { clearance.get().0 } else { clearance.get().0.max(-GRAZE) };
             known && line.least_over(self, level, block) >= matters
         };
+        let lower = |from: f64, to: f64, piece: &Parabola| {
+            let (lowest, v) = piece.lowest();
+            if lowest < clearance.get().0 {
+                clearance.set((lowest, from + (to - from) * v));
+            }
+            (lowest, v)
+        };
+        // A few strips looked at beforehand give a low clearance to begin with, below which most blocks do not reach.
+        for probe in 0..PROBES {
+            let strip = strips.start + (strips.end - strips.start) * (2 * probe + 1) / (2 * PROBES);
+            line.clearances(self, strip, |from, to, piece| {
+                piece.inspect(|piece| {
+                    lower(from, to, piece);
+                });
+            });
+        }
         line.line.walk(self, (strips.start, strips.end), true, skip, |strip| {
             line.clearances(self, strip, |from, to, piece| match piece {
                 Some(piece) => {
-                    let (lowest, v) = piece.lowest();
-                    if lowest < clearance.get().0 {
-                        clearance.set((lowest, from + (to - from) * v));
-                    }
+                    let (lowest, v) = lower(from, to, &piece);
                     if blocked_at.get().is_none() && lowest < -GRAZE {
                         let v = piece.first_at_most(-GRAZE).unwrap_or(v);
                         blocked_at.set(Some(from + (to - from) * v));

@@ -168,12 +168,12 @@ impl Land {
         }
         let wedges = scene.wedges();
         let marks = Seen { marks: seen.as_mut_ptr(), len: seen.len() };
-        let decided: Vec<(Frame, usize, Vec<(Pending, bool)>)> = wedges
+        let decided: Vec<_> = wedges
             .into_par_iter()
             .map(|(frame, from, to)| {
                 let found = sweep::sweep(&scene, &frame, from, to, &marks);
                 let free = |pending: &Pending| (*pending, scene.free(&frame, pending));
-                (frame, found.seen, found.pending.iter().map(free).collect())
+                (frame, found.seen, found.pending.iter().map(free).collect::<Vec<_>>())
             })
             .collect();
 
@@ -234,10 +234,10 @@ impl Scene<'_> {
 
     /// Whether heights are so great that single precision could overflow or mean nothing: no land is like that.
     fn is_beyond_reason(&self) -> bool {
-        let range = self.land.height_range();
+        let range = self.land.ranges().range();
         let drop = self.drop_per_square * self.land.extent().length_squared();
         let greatest = f64::from(range.low.abs().max(range.high.abs()));
-        !(greatest.max(self.eye_height.abs()).max(self.target_height).max(drop) < 1e7)
+        greatest.max(self.eye_height.abs()).max(self.target_height).max(drop) >= 1e7
     }
 
     /// Decides every sample by its line of sight.
