@@ -1,7 +1,7 @@
 //! What a height file is and holds, and how long that takes: `cargo run --release --example survey FILE [MOST_SAMPLES]`.
 //! With a number, the file is also loaded into at most so many samples.
 
-use littoral_data::{LoadOptions, formats::tiff::open, load_from, survey};
+use littoral_data::{LoadOptions, load_from, open, survey};
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

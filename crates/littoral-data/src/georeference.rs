@@ -294,3 +294,146 @@ impl Georeference {
         warnings
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn placed(geotransform: [f64; 6], crs: Crs, size: [usize; 2]) -> Georeference {
+        Georeference { geotransform, registration: Registration::Area, crs, size, y_south: false }
+    }
+
+    fn metres() -> Crs {
+        Crs::Projected { name: "metres".into(), metres: 1.0, definition: None }
+    }
+
+    fn close(a: DVec2, b: DVec2, tolerance: f64) {
+        assert!((a - b).abs().max_element() < tolerance, "expected {b}, got {a}");
+    }
+
+    #[test]
+    fn degrees_have_the_lengths_of_geodesy() {
+        // Metres per degree on WGS84 as NGA's tables give them; at the pole the radius of curvature is a² / c.
+        for (latitude, east, north) in
+            [(0.0, 111_319.491, 110_574.276), (45.0, 78_846.806, 111_131.779), (90.0, 0.0, 111_693.979)]
+        {
+            close(metres_per_degree(latitude), DVec2::new(east, north), 0.2);
+            close(metres_per_degree(-latitude), metres_per_degree(latitude), 1e-12);
+        }
+    }
+
+    #[test]
+    fn local_metres_are_right_handed_with_north_up() {
+        let none = Georeference::none(5, 3);
+        // (geotransform, y to the south, where the sample of row 0, column 0 lies)
+        let grids = [
+            (placed([100.0, 2.0, 0.0, 50.0, 0.0, -3.0], metres(), [5, 3]), [-4.0, 3.0]),
+            (placed([100.0, 2.0, 0.0, 50.0, 0.0, 3.0], metres(), [5, 3]), [-4.0, -3.0]),
+            (placed([100.0, -2.0, 0.0, 50.0, 0.0, -3.0], metres(), [5, 3]), [4.0, 3.0]),
+            (placed([100.0, -2.0, 0.0, 50.0, 0.0, 3.0], metres(), [5, 3]), [4.0, -3.0]),
+            (none.clone(), [-2.0, 1.0]),
+            (none.resized(10, 6), [-2.25, 1.25]),
+            (none.window(Window { column: 2, row: 1, columns: 3, rows: 2 }), [-1.0, 0.5]),
+        ];
+        for (grid, first) in grids {
+            close(grid.local_from_sample().transform_point2(DVec2::ZERO), first.into(), 1e-12);
+            assert_eq!(grid.grid_north(), 0.0, "{grid:?}");
+            let middle = grid.crs_from_local().transform_point2(DVec2::ZERO);
+            close(middle, grid.middle(), 1e-9);
+            let east = grid.crs_from_local().transform_point2(DVec2::X) - middle;
+            let north = grid.crs_from_local().transform_point2(DVec2::Y) - middle;
+            close(east, DVec2::X, 1e-9);
+            close(north, if grid.y_south { DVec2::NEG_Y } else { DVec2::Y }, 1e-9);
+        }
+    }
+
+    #[test]
+    fn rotated_grids_know_where_north_is() {
+        for degrees in [0.0, 20.0, -20.0, 75.0, 89.9] {
+            let angle = f64::to_radians(degrees);
+            let (sine, cosine) = angle.sin_cos();
+            // Columns run `angle` counter-clockwise from east; rows run southward from there.
+            for (rows, down) in [(1.0, [30.0 * sine, -30.0 * cosine]), (-1.0, [-30.0 * sine, 30.0 * cosine])] {
+                let grid = placed([7e5, 20.0 * cosine, down[0], 5e6, 20.0 * sine, down[1]], metres(), [160, 120]);
+                close(grid.spacing(), DVec2::new(20.0, 30.0), 1e-9);
+                assert!((grid.grid_north() - -angle).abs() < 1e-12, "{degrees}, {rows}: {}", grid.grid_north());
+                let north = DVec2::from_angle(FRAC_PI_2 + grid.grid_north());
+                let step = grid.crs_from_local().transform_vector2(north);
+                close(step, DVec2::Y, 1e-9);
+                let transform = grid.local_from_sample() * grid.crs_from_sample().inverse();
+                assert!((transform.matrix2.determinant() - 1.0).abs() < 1e-9, "lengths and handedness kept");
+            }
+        }
+    }
+
+    #[test]
+    fn degrees_become_metres_and_feet_too() {
+        let crs = Crs::Geographic { name: "EPSG:4326".into() };
+        let grid = placed([-158.65, 0.03, 0.0, 21.0, 0.0, -0.03], crs, [96, 64]);
+        close(grid.spacing(), metres_per_degree(21.0 - 0.96) * 0.03, 1e-9);
+        let feet = Crs::Projected { name: "feet".into(), metres: 0.3048, definition: None };
+        close(placed([0.0, 10.0, 0.0, 0.0, 0.0, -5.0], feet, [9, 9]).spacing(), DVec2::new(3.048, 1.524), 1e-12);
+    }
+
+    #[test]
+    fn longitudes_turn_to_the_file() {
+        let crs = || Crs::Geographic { name: "EPSG:4326".into() };
+        let east = placed([150.0, 0.5, 0.0, 10.0, 0.0, -0.5], crs(), [140, 40]); // 150 to 220
+        for (asked, expected) in [(-170.0, 190.0), (160.0, 160.0), (190.0, 190.0), (-145.0, 215.0), (520.0, 160.0)] {
+            close(east.crs_from_lonlat(DVec2::new(asked, 1.0)).expect("degrees"), DVec2::new(expected, 1.0), 1e-9);
+        }
+        close(east.lonlat_from_crs(DVec2::new(190.0, 1.0)).expect("degrees"), DVec2::new(-170.0, 1.0), 1e-9);
+        close(east.lonlat_from_crs(DVec2::new(180.0, 1.0)).expect("degrees"), DVec2::new(180.0, 1.0), 1e-9);
+        let whole = placed([0.0, 1.0, 0.0, 90.0, 0.0, -1.0], crs(), [360, 180]);
+        close(whole.crs_from_lonlat(DVec2::new(-158.0, 21.0)).expect("degrees"), DVec2::new(202.0, 21.0), 1e-9);
+    }
+
+    #[test]
+    fn meridians_converge_on_maps() {
+        let utm = Crs::from_epsg(32610).expect("known");
+        let grid = placed([562_000.0, 30.0, 0.0, 5_118_000.0, 0.0, -30.0], utm, [100, 100]);
+        // Transverse Mercator: convergence ≈ Δλ sin φ; east of the central meridian true north lies to the left.
+        let lonlat = grid.lonlat_from_crs(grid.middle()).expect("within reach");
+        let expected = (lonlat.x + 123.0).to_radians() * lonlat.y.to_radians().sin();
+        assert!((grid.true_north() - expected).abs() < 1e-5, "{} against {expected}", grid.true_north());
+        assert_eq!(grid.grid_north(), 0.0);
+        close(grid.spacing(), DVec2::splat(30.0), 1e-12);
+        let back = grid.crs_from_lonlat(lonlat).expect("within reach");
+        close(back, grid.middle(), 1e-4);
+    }
+
+    #[test]
+    fn web_mercator_is_not_taken_at_its_word() {
+        let mercator = Crs::from_epsg(3857).expect("known");
+        let y = 8_399_737.889_818; // 60 degrees north
+        let grid = placed([0.0, 100.0, 0.0, y + 5000.0, 0.0, -100.0], mercator, [100, 100]);
+        let spacing = grid.spacing();
+        assert!((spacing - 50.0).abs().max_element() < 0.2, "{spacing}");
+        assert!(grid.warnings().iter().any(|warning| warning.contains("stretches lengths by")));
+        let utm = Crs::from_epsg(32610).expect("known");
+        assert_eq!(placed([5e5, 1.0, 0.0, 5e6, 0.0, -1.0], utm, [9, 9]).warnings(), [""; 0]);
+    }
+
+    #[test]
+    fn what_cannot_be_computed_is_said() {
+        let none = Georeference::none(3, 3).crs_from_lonlat(DVec2::ZERO).expect_err("no system");
+        assert!(none.contains("got none"), "{none}");
+        let grid = placed([0.0, 1.0, 0.0, 0.0, 0.0, -1.0], metres(), [9, 9]);
+        assert!(grid.crs_from_lonlat(DVec2::ZERO).expect_err("no definition").contains("got metres"));
+        let wide = placed([-180.0, 1.0, 0.0, 90.0, 0.0, -1.0], Crs::Geographic { name: "degrees".into() }, [360, 180]);
+        assert!(wide.warnings()[0].contains("true in the middle only"));
+        let sheared = placed([0.0, 1.0, 0.5, 0.0, 0.0, -1.0], metres(), [9, 9]);
+        assert!(sheared.warnings()[0].contains("meet at"));
+    }
+
+    #[test]
+    fn world_files_speak_of_pixel_centres() {
+        let text = "30.0\r\n0.0\n0.0\n-30.0\n560820.0\n5115990.0\n";
+        let expected = [560_805.0, 30.0, 0.0, 5_116_005.0, 0.0, -30.0];
+        assert_eq!(Georeference::geotransform_of_world_file(text), Some(expected));
+        for broken in ["", "1 2 3", "1 0 0 0 5 5", "a b c d e f", "1 0 0 nan 5 5", "1 0 0 inf 5 5"] {
+            assert_eq!(Georeference::geotransform_of_world_file(broken), None, "{broken}");
+        }
+    }
+}

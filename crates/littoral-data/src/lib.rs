@@ -18,10 +18,13 @@ mod error;
 pub mod formats;
 mod georeference;
 mod image;
+pub mod path;
 mod reduce;
 mod source;
 mod survey;
 pub mod voids;
+mod wkt;
+pub mod write;
 
 pub use crate::image::{BEHIND, Image, image_from, open_image};
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};

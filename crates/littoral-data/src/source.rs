@@ -14,6 +14,13 @@ pub enum VerticalDatum {
     Named(String),
 }
 
+impl VerticalDatum {
+    /// The vertical system within a well-known text, and metres in one of its units; `None` if it names none.
+    pub fn from_wkt(text: &str) -> Option<(VerticalDatum, f64)> {
+        crate::wkt::vertical(text)
+    }
+}
+
 /// What a file is, from its header alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Info {

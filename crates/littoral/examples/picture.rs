@@ -3,13 +3,13 @@
 //! ```text
 //! cargo run --release --example picture -- OUT.png [name=value …]
 //!   raw=FILE columns=N rows=N dx=M [dy=M] [void=H]   little-endian f32 heights, northern row first
-//!   size=1280x720 samples=12 style=natural|tint|relief sun=AZIMUTH,ELEVATION visibility=M level=M stops=S
+//!   size=1280x720 samples=12 style=natural|tint|relief sun=AZIMUTH,ELEVATION visibility=M level=M stops=S overhead=1
 //!   eye=X,Y,Z look=X,Y,Z fov=DEGREES
 //! ```
 
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::{Land, Raster, coast};
-use littoral::picture::{Display, Scene, Settings, Stage, Style, Sun, Water, coast_shot, compose};
+use littoral::picture::{Display, Scene, Settings, Stage, Style, Sun, Water, coast_shot, compose, overhead};
 use littoral::space::View;
 use std::collections::HashMap;
 use std::time::Instant;
@@ -35,8 +35,11 @@ fn main() -> Result<(), Failure> {
     let size = numbers("size").map_or(UVec2::new(1280, 720), |s| UVec2::new(s[0] as u32, s[1] as u32));
     let mut shot = match options.contains_key("raw") {
         true => compose(&land, water.as_ref(), size),
-        false => coast_shot(&land, water.as_ref(), size),
+        false => coast_shot(size),
     };
+    if options.contains_key("overhead") {
+        shot = overhead(&land, water.as_ref(), size);
+    }
     eprintln!("shot {:?}: eye {:.0}", started.elapsed(), shot.view.eye);
     if let (Some(eye), Some(look)) = (numbers("eye"), numbers("look")) {
         let fov = number("fov").unwrap_or(45.0).to_radians() as f32;

@@ -78,6 +78,11 @@ impl Land {
         self.patch_at(self.lattice(xy))
     }
 
+    /// [`Land::height_at`] for a position in units of samples.
+    pub(crate) fn height_at_lattice(&self, at: DVec2) -> Option<f32> {
+        self.patch_at(at).map(interpolate)
+    }
+
     /// The same for a position in units of samples.
     fn patch_at(&self, lattice: DVec2) -> Option<([f32; 4], DVec2)> {
         let last = DVec2::new((self.raster.columns() - 1) as f64, (self.raster.rows() - 1) as f64);
@@ -174,7 +179,7 @@ impl HeightField for Land {
 
     fn height(&self, at: Place) -> Option<f32> {
         // Straight in lattice units: by way of the world a place on the line between two cells would move off it.
-        self.patch_at(at.uv * f64::from(1u32 << self.finest)).map(interpolate)
+        self.height_at_lattice(at.uv * f64::from(1u32 << self.finest))
     }
 
     fn range(&self, cell: Cell) -> HeightRange {

@@ -1,7 +1,8 @@
 //! A rendered picture, and its way to a screen.
 
 use super::texture::encode_srgb;
-use glam::{DVec3, UVec2, Vec3};
+use glam::{DVec3, Mat3, UVec2, Vec3};
+use rayon::prelude::*;
 
 /// What a view sees: planes of numbers, one a pixel, row by row from the top left.
 #[derive(Clone, Debug)]
@@ -10,6 +11,8 @@ pub struct Picture {
     pub size: UVec2,
     /// Where the eye was (m), which `position` is relative to.
     pub eye: DVec3,
+    /// What `radiance` is a picture of, and so how it wants to be shown.
+    pub medium: Medium,
     /// Radiance as linear Rec. 709 red, green, blue, in kilocandela per square metre.
     pub radiance: Vec<[f32; 3]>,
     /// Distance from the eye along the ray (m); infinite where there is sky.
@@ -22,6 +25,18 @@ pub struct Picture {
     pub height: Vec<f32>,
     /// Share of the pixel that is not sky, in [0, 1].
     pub coverage: Vec<f32>,
+}
+
+/// What a picture's radiance is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Medium {
+    /// Light of a landscape: exposed, and shown with the contrast and colour of film.
+    #[default]
+    Photograph,
+    /// Light on a model whose colours mean something: exposed, its colours kept.
+    Model,
+    /// The reflectance of paper, shown as it is.
+    Paper,
 }
 
 /// How bright a picture is shown.
@@ -50,31 +65,79 @@ impl Default for Display {
 }
 
 impl Picture {
-    /// The radiance that an automatic exposure shows as middle grey (kcd/m²).
-    pub fn grey(&self) -> f32 {
-        let mut sum = 0.0f64;
-        for p in &self.radiance {
-            sum += f64::from(luminance(*p).max(1e-6)).ln();
+    /// A black picture of sky alone.
+    pub(super) fn empty(size: UVec2, eye: DVec3) -> Picture {
+        let pixels = size.x as usize * size.y as usize;
+        Picture {
+            size,
+            eye,
+            medium: Medium::Photograph,
+            radiance: vec![[0.0; 3]; pixels],
+            depth: vec![f32::INFINITY; pixels],
+            normal: vec![[0.0; 3]; pixels],
+            position: vec![[f32::INFINITY; 3]; pixels],
+            height: vec![f32::NAN; pixels],
+            coverage: vec![0.0; pixels],
         }
-        (sum / self.radiance.len().max(1) as f64).exp() as f32
     }
 
-    /// The picture for an sRGB screen, 8 bits a channel.
+    /// The radiance that an automatic exposure shows as middle grey (kcd/m²): the logarithmic mean of what is neither among the
+    /// darkest tenth of the picture nor among the brightest, so that neither the sun's glitter nor a black corner decides.
+    pub fn grey(&self) -> f32 {
+        let mut logs: Vec<f32> = self.radiance.iter().map(|p| luminance(*p).max(1e-9).ln()).collect();
+        if logs.is_empty() {
+            return 1.0;
+        }
+        logs.sort_unstable_by(f32::total_cmp);
+        let (from, to) = (logs.len() / 10, logs.len() - logs.len() / 10);
+        let middle = &logs[from..to.max(from + 1)];
+        let mean = middle.iter().map(|l| f64::from(*l)).sum::<f64>() / middle.len() as f64;
+        mean.exp() as f32
+    }
+
+    /// The picture for an sRGB screen, 8 bits a channel, row by row.
     pub fn display(&self, how: &Display) -> Vec<[u8; 3]> {
+        if self.medium == Medium::Paper {
+            let shown = |p: &[f32; 3]| p.map(|v| (encode_srgb(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8);
+            return self.radiance.par_iter().map(shown).collect();
+        }
         let grey = match how.exposure {
             Exposure::Automatic => self.grey(),
             Exposure::Grey(grey) => grey,
         };
-        let scale = 0.18 / grey.max(1e-12) * how.compensation.exp2();
+        let (contrast, colour) = if self.medium == Medium::Model { (1.15, 1.0) } else { (1.35, 1.28) };
+        let scale = 0.30 / grey.max(1e-9) * how.compensation.exp2();
         self.radiance
-            .iter()
+            .par_iter()
             .map(|p| {
-                let c = Vec3::from(*p) * scale;
-                let c = c / (c + 1.0) * 1.1;
-                c.to_array().map(|v| (encode_srgb(v.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8)
+                let shown = film(Vec3::from(*p) * scale, contrast, colour);
+                // What lies between two steps of the screen is rounded; skies are graded finely enough by sampling noise.
+                shown.to_array().map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
             })
             .collect()
     }
+}
+
+/// Film: linear light to display values in [0, 1] (already encoded for the screen). T. Sobotka's AgX, in B. Wrensch's polynomial form
+/// (2023): colours lose saturation as they brighten, as on film, and nothing clips. `contrast` and
+/// `colour` of 1 are AgX's neutral look.
+fn film(light: Vec3, contrast: f32, colour: f32) -> Vec3 {
+    const INSET: Mat3 = Mat3::from_cols_array(&[
+        0.842_479_1, 0.042_328_24, 0.042_375_65, 0.078_433_6, 0.878_468_64, 0.078_433_6, 0.079_223_745, 0.079_166_13,
+        0.879_142_97,
+    ]);
+    const OUTSET: Mat3 = Mat3::from_cols_array(&[
+        1.196_879, -0.052_896_85, -0.052_971_635, -0.098_020_88, 1.151_903_1, -0.098_043_45, -0.099_029_74,
+        -0.098_961_18, 1.151_073_7,
+    ]);
+    const LEAST: f32 = -12.473_93;
+    const MOST: f32 = 4.026_069;
+    let x = (INSET * light.max(Vec3::ZERO)).map(|v| (v.max(1e-10).log2().clamp(LEAST, MOST) - LEAST) / (MOST - LEAST));
+    let (x2, x4) = (x * x, x * x * x * x);
+    let curve = 15.5 * x4 * x2 - 40.14 * x4 * x + 31.96 * x4 - 6.868 * x2 * x + 0.4298 * x2 + 0.1191 * x - 0.002_32;
+    let curve = curve.clamp(Vec3::ZERO, Vec3::ONE).map(|v| v.powf(contrast));
+    let grey = Vec3::splat(luminance(curve.to_array()));
+    OUTSET * (grey + (curve - grey) * colour).clamp(Vec3::ZERO, Vec3::ONE)
 }
 
 /// Luminance of a linear Rec. 709 colour.

@@ -14,14 +14,24 @@
 //!
 //! The same scene, view and settings give the same bits, however many threads work.
 
+mod atmosphere;
+mod cartography;
 mod compose;
 mod display;
+mod grain;
+mod ground;
+mod natural;
+mod sampler;
+mod sea;
+mod shade;
+mod skylight;
+mod spectrum;
 mod stage;
 mod texture;
 mod water;
 
-pub use compose::{Shot, coast_shot, compose};
-pub use display::{Display, Exposure, Picture};
+pub use compose::{Shot, coast_shot, compose, overhead};
+pub use display::{Display, Exposure, Medium, Picture};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
 pub use water::Water;

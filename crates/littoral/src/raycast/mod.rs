@@ -5,10 +5,13 @@
 //! starts on the sheet hits it at 0. Through holes and under the sheet's edges rays pass.
 
 mod bulk;
+mod camera;
+mod heights;
 mod lanes;
 mod profile;
 mod scene;
 mod section;
+mod segments;
 mod sight;
 mod slope;
 mod stream;

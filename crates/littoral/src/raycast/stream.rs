@@ -105,17 +105,18 @@ impl Prepared {
     ) {
         let zero = l.splat(0.0);
         let infinity = l.splat(f32::INFINITY);
-        // x − x is 0 unless x is infinite or NaN.
-        let finite = |x: L::F| l.le(l.sub(x, x), zero);
-        let all_finite = origin.into_iter().chain(direction).map(finite).reduce(|a, b| l.and(a, b));
-        let mut valid = l.and(l.le(zero, reach), all_finite.unwrap_or(l.mask(0)));
+        // 0 · x is 0 unless x is infinite or NaN.
+        let mut finite = zero;
+        for axis in 0..3 {
+            finite = l.add(finite, l.add(l.mul(zero, origin[axis]), l.mul(zero, direction[axis])));
+        }
+        let mut valid = l.and(l.le(zero, reach), l.le(finite, zero));
         let z = l.add(origin[2], l.splat(scene.height));
         let dz = direction[2];
-        let absolute = |x: L::F| l.max(x, l.sub(zero, x));
         let tiny = l.splat(1e-20);
 
         // Between the lowest and highest height …
-        let level_ray = l.lt(absolute(dz), tiny);
+        let level_ray = l.lt(absolute(l, dz), tiny);
         let inverse = l.div(l.splat(1.0), l.select(level_ray, l.splat(1.0), dz));
         let (a, b) = (l.mul(l.sub(l.splat(scene.low), z), inverse), l.mul(l.sub(l.splat(scene.high), z), inverse));
         let outside = l.or(l.lt(z, l.splat(scene.low)), l.lt(l.splat(scene.high), z));
@@ -144,7 +145,7 @@ impl Prepared {
             let inverse = l.select(still, l.splat(1e30), l.div(l.splat(1.0), l.select(still, l.splat(1.0), w)));
             let inside = l.and(l.le(low, q), l.le(q, high));
             valid = l.without(valid, l.without(still, inside));
-            let nudge = l.mul(l.max(absolute(high), l.splat(1.0)), l.splat(2.4e-7));
+            let nudge = l.mul(l.max(absolute(l, high), l.splat(1.0)), l.splat(2.4e-7));
             q = l.select(still, l.min(l.sub(high, nudge), q), q);
             let (enter, leave) = (l.mul(l.sub(low, q), inverse), l.mul(l.sub(high, q), inverse));
             start = l.max(l.select(still, zero, enter), start);
@@ -275,7 +276,7 @@ impl<L: Lanes> Packet<L> {
     ) -> bool {
         let all = (1u32 << L::COUNT) - 1;
         let done = l.bits(l.igt(l.int(0), self.level));
-        if done.count_ones() * 16 < REFILL * L::COUNT as u32 {
+        if done.count_ones() * 16 < scene.tune[0] as u32 * L::COUNT as u32 {
             return true;
         }
         let mut deliver = done & self.occupied;
@@ -343,11 +344,11 @@ impl<L: Lanes> Packet<L> {
     #[inline(always)]
     fn step<const SHEET: bool, const ANY: bool>(&mut self, l: L, scene: &Scene) {
         let (zero, one) = (l.int(0), l.int(1));
-        let crossing_x = |line: L::I| l.mul(l.sub(l.float(l.isub(line, self.base_x)), self.x), self.inverse_x);
-        let crossing_y = |line: L::I| l.mul(l.sub(l.float(l.isub(line, self.base_y)), self.y), self.inverse_y);
+        let lines_x = Lines { base: self.base_x, origin: self.x, inverse: self.inverse_x };
+        let lines_y = Lines { base: self.base_y, origin: self.y, inverse: self.inverse_y };
         let next_x = l.shl(l.iadd(l.shr(self.cell_x, self.level), one), self.level);
         let next_y = l.shl(l.iadd(l.shr(self.cell_y, self.level), one), self.level);
-        let (tx, ty) = (crossing_x(next_x), crossing_y(next_y));
+        let (tx, ty) = (lines_x.crossing(l, next_x), lines_y.crossing(l, next_y));
         let leave = l.max(l.min(l.min(tx, ty), self.end), self.t);
         let z0 = l.add(self.z, l.mul(self.t, self.dz));
         let z1 = l.add(self.z, l.mul(leave, self.dz));
@@ -376,7 +377,7 @@ impl<L: Lanes> Packet<L> {
         let mut hit = l.mask(0);
         let patches = l.ieq(self.level, zero);
         let (waiting, walking) = (l.bits(patches), l.bits(inner));
-        if waiting != 0 && (walking == 0 || waiting.count_ones() * 16 >= PATIENCE * L::COUNT as u32) {
+        if waiting != 0 && (walking == 0 || waiting.count_ones() * 16 >= scene.tune[1] as u32 * L::COUNT as u32) {
             let column = l.iselect(patches, column, zero);
             let row = l.iselect(patches, row, zero);
             let here = l.iadd(l.imul(row, l.int(scene.columns)), column);
@@ -389,23 +390,16 @@ impl<L: Lanes> Packet<L> {
             let north = l.sub(c, a);
             let twist = l.sub(l.sub(d, c), east);
             if SHEET {
-                let unit = l.splat(1.0);
-                let x_lines = (crossing_x(self.cell_x), crossing_x(l.iadd(self.cell_x, one)));
-                let y_lines = (crossing_y(self.cell_y), crossing_y(l.iadd(self.cell_y, one)));
+                let x_lines = (lines_x.crossing(l, self.cell_x), lines_x.crossing(l, l.iadd(self.cell_x, one)));
+                let y_lines = (lines_y.crossing(l, self.cell_y), lines_y.crossing(l, l.iadd(self.cell_y, one)));
                 let x = (self.x, self.dx, l.float(l.isub(self.cell_x, self.base_x)));
                 let y = (self.y, self.dy, l.float(l.isub(self.cell_y, self.base_y)));
                 u0 = within(l, x_lines, x, self.sign_x, self.t);
                 u1 = within(l, x_lines, x, self.sign_x, leave);
                 v0 = within(l, y_lines, y, self.sign_y, self.t);
                 v1 = within(l, y_lines, y, self.sign_y, leave);
-                let bilinear = |u: L::F, v: L::F| {
-                    let (west, south) = (l.sub(unit, u), l.sub(unit, v));
-                    let at_south = l.add(l.mul(a, west), l.mul(b, u));
-                    let at_north = l.add(l.mul(c, west), l.mul(d, u));
-                    l.add(l.mul(at_south, south), l.mul(at_north, v))
-                };
-                f0 = l.sub(z0, bilinear(u0, v0));
-                f1 = l.sub(z1, bilinear(u1, v1));
+                f0 = l.sub(z0, blend(l, [a, b, c, d], u0, v0));
+                f1 = l.sub(z1, blend(l, [a, b, c, d], u1, v1));
             } else {
                 let (from_x, from_y) =
                     (l.float(l.isub(column, l.int(scene.cell[0]))), l.float(l.isub(row, l.int(scene.cell[1]))));
@@ -413,10 +407,8 @@ impl<L: Lanes> Packet<L> {
                 v0 = l.sub(l.flip(l.add(self.y, l.mul(self.t, self.dy)), self.sign_y), from_y);
                 u1 = l.sub(l.flip(l.add(self.x, l.mul(leave, self.dx)), self.sign_x), from_x);
                 v1 = l.sub(l.flip(l.add(self.y, l.mul(leave, self.dy)), self.sign_y), from_y);
-                let bilinear =
-                    |u: L::F, v: L::F| l.add(l.add(a, l.mul(east, u)), l.mul(v, l.add(north, l.mul(twist, u))));
-                f0 = l.sub(z0, bilinear(u0, v0));
-                f1 = l.sub(z1, bilinear(u1, v1));
+                f0 = l.sub(z0, l.add(l.add(a, l.mul(east, u0)), l.mul(v0, l.add(north, l.mul(twist, u0)))));
+                f1 = l.sub(z1, l.add(l.add(a, l.mul(east, u1)), l.mul(v1, l.add(north, l.mul(twist, u1)))));
             }
             // f(s) = f0 + slope·s + bend·s², seen from above.
             let nought = l.splat(0.0);
@@ -467,10 +459,10 @@ impl<L: Lanes> Packet<L> {
         let mut follow_y = l.iadd(l.floor(l.add(self.y, l.mul(leave, self.dy))), self.base_y);
         if SHEET {
             // What counts is the crossing, not the rounded position.
-            follow_x = l.iselect(l.lt(leave, crossing_x(follow_x)), l.isub(follow_x, one), follow_x);
-            follow_x = l.iselect(l.le(crossing_x(l.iadd(follow_x, one)), leave), l.iadd(follow_x, one), follow_x);
-            follow_y = l.iselect(l.lt(leave, crossing_y(follow_y)), l.isub(follow_y, one), follow_y);
-            follow_y = l.iselect(l.le(crossing_y(l.iadd(follow_y, one)), leave), l.iadd(follow_y, one), follow_y);
+            follow_x = l.iselect(l.lt(leave, lines_x.crossing(l, follow_x)), l.isub(follow_x, one), follow_x);
+            follow_x = l.iselect(l.le(lines_x.crossing(l, l.iadd(follow_x, one)), leave), l.iadd(follow_x, one), follow_x);
+            follow_y = l.iselect(l.lt(leave, lines_y.crossing(l, follow_y)), l.isub(follow_y, one), follow_y);
+            follow_y = l.iselect(l.le(lines_y.crossing(l, l.iadd(follow_y, one)), leave), l.iadd(follow_y, one), follow_y);
         }
         let follow_x = l.imax(l.imin(follow_x, l.imin(self.last_x, l.isub(next_x, one))), self.cell_x);
         let follow_y = l.imax(l.imin(follow_y, l.imin(self.last_y, l.isub(next_y, one))), self.cell_y);
@@ -480,13 +472,45 @@ impl<L: Lanes> Packet<L> {
         self.t = l.select(advance, leave, self.t);
 
         // A level up where the line ends the coarser node as well, down into nodes that are in the way.
-        let ends = l.ieq(l.iand(line, l.shl(one, self.level)), zero);
+        let ends = l.ieq(l.iand(line, l.shl(l.int(scene.tune[2]), self.level)), zero);
         let up = l.and(l.and(advance, ends), l.igt(l.int(scene.top), self.level));
         let finished = l.or(hit, l.and(advance, l.le(self.end, leave)));
         let mut level = l.iselect(up, l.iadd(self.level, one), self.level);
-        level = l.iselect(l.without(inner, clear), l.isub(self.level, one), level);
+        let down = l.iselect(l.igt(self.level, l.int(scene.tune[3])), l.int(2), one);
+        level = l.iselect(l.without(inner, clear), l.isub(self.level, down), level);
         self.level = l.iselect(finished, l.int(-1), level);
     }
+}
+
+/// The size of a number. (Functions rather than closures throughout the kernels: a closure is compiled by itself, without
+/// the features of the function around it.)
+#[inline(always)]
+pub(super) fn absolute<L: Lanes>(l: L, a: L::F) -> L::F {
+    l.max(a, l.sub(l.splat(0.0), a))
+}
+
+/// The lines between cells along one axis, and the ray's way across them.
+struct Lines<L: Lanes> {
+    base: L::I,
+    origin: L::F,
+    inverse: L::F,
+}
+
+impl<L: Lanes> Lines<L> {
+    /// The distance at which the ray crosses a line: always this one expression.
+    #[inline(always)]
+    fn crossing(&self, l: L, line: L::I) -> L::F {
+        l.mul(l.sub(l.float(l.isub(line, self.base)), self.origin), self.inverse)
+    }
+}
+
+/// The bilinear height in the form that is exact on the lines between patches.
+#[inline(always)]
+pub(super) fn blend<L: Lanes>(l: L, [a, b, c, d]: [L::F; 4], u: L::F, v: L::F) -> L::F {
+    let (west, south) = (l.sub(l.splat(1.0), u), l.sub(l.splat(1.0), v));
+    let at_south = l.add(l.mul(a, west), l.mul(b, u));
+    let at_north = l.add(l.mul(c, west), l.mul(d, u));
+    l.add(l.mul(at_south, south), l.mul(at_north, v))
 }
 
 /// Position within a cell at distance `t`, exactly 0 or 1 on its lines, turned back into that of the raster: `lines` are

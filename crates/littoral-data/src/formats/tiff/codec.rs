@@ -11,7 +11,8 @@ use super::samples::SampleKind;
 pub(super) struct Scratch {
     /// The chunk as it is in the file.
     pub encoded: Vec<u8>,
-    /// The chunk's samples, row by row.
+    /// The chunk's samples, row by row, and perhaps more behind them: grown by new zero pages, never cleared, so that a
+    /// size that turns out to be a lie costs no memory.
     pub decoded: Vec<u8>,
     deflate: Option<libdeflater::Decompressor>,
     zstd: Option<zstd::bulk::Decompressor<'static>>,
@@ -22,19 +23,24 @@ pub(super) struct Scratch {
 const MOST_DICTIONARY: u32 = 66 * 1024;
 
 impl Scratch {
-    /// Decodes `self.encoded` into `self.decoded`, which becomes `size` bytes long; how many of them are good, counted
-    /// from the first. The error says what the codec did not like.
+    /// Decodes `self.encoded` into the first `size` bytes of `self.decoded`; how many of them are good, counted from the
+    /// first. The error says what the codec did not like.
     pub(super) fn decode(&mut self, image: &Image, size: usize) -> Result<usize, String> {
         if image.reversed_bits {
             self.encoded.iter_mut().for_each(|byte| *byte = byte.reverse_bits());
         }
-        self.decoded.resize(size, 0);
+        let most = self.encoded.len().saturating_mul(image.compression.most_expansion());
+        if most < size && image.compression != Compression::None {
+            return Err(format!("{} bytes cannot hold the {size} of its samples", self.encoded.len()));
+        }
+        let size = size.min(most);
+        grow(&mut self.decoded, size);
         let Scratch { encoded, decoded, deflate, zstd, inner } = self;
+        let decoded = &mut decoded[..size];
         match image.compression {
             Compression::None => {
-                let count = size.min(encoded.len());
-                decoded[..count].copy_from_slice(&encoded[..count]);
-                Ok(count)
+                decoded.copy_from_slice(&encoded[..size]);
+                Ok(size)
             }
             Compression::PackBits => Ok(unpack_bits(encoded, decoded)),
             Compression::Lzw => lzw(encoded, decoded),
@@ -44,7 +50,7 @@ impl Scratch {
             Compression::Lerc => lerc(image, encoded, decoded),
             // Anything above the raw size of the blob's samples, their mask and a header is not LERC.
             Compression::LercDeflate | Compression::LercZstd => {
-                inner.resize(size + size / 8 + 4096, 0);
+                grow(inner, size + size / 8 + 4096);
                 let count = match image.compression {
                     Compression::LercDeflate => inflate(deflate, encoded, inner)?,
                     _ => unzstd(zstd, encoded, inner)?,
@@ -52,6 +58,13 @@ impl Scratch {
                 lerc(image, &inner[..count], decoded)
             }
         }
+    }
+}
+
+/// Makes a buffer at least so long. Fresh zero pages take no memory before they are written to.
+fn grow(buffer: &mut Vec<u8>, size: usize) {
+    if buffer.len() < size {
+        *buffer = vec![0; size];
     }
 }
 

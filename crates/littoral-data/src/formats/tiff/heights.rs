@@ -29,7 +29,8 @@ pub(super) fn decode(
     }
     let [columns, rows] = image.extent(chunk);
     let row_bytes = image.row_bytes();
-    let mut heights = vec![f32::NAN; columns * rows];
+    // Made when the first rows have been decoded: a size that no data stands behind costs nothing.
+    let mut all = Vec::new();
     let mut problem = None;
     let mut first = 0;
     for &segment in segments.iter() {
@@ -38,8 +39,8 @@ pub(super) fn decode(
         if segment.bytes == 0 {
             continue;
         }
-        let readable = image.readable(segment) as usize;
-        scratch.encoded.resize(readable, 0);
+        // Never longer than the file, and cleared only where it grows.
+        scratch.encoded.resize(image.readable(segment) as usize, 0);
         let read = file.bytes.read(segment.offset, &mut scratch.encoded);
         let good = match read {
             Err(error) => Err(error.to_string()),
@@ -63,8 +64,12 @@ pub(super) fn decode(
         if problem.is_none() && segment.offset.saturating_add(segment.bytes) > file.bytes.length() {
             problem = Some(format!("its {} bytes overrun the file, and yet all rows were found", segment.bytes));
         }
-        let rows = scratch.decoded.chunks_exact_mut(row_bytes).take(whole_rows.min(segment.rows));
-        for (row, heights) in rows.zip(heights[here.start * columns..].chunks_exact_mut(columns)) {
+        if whole_rows == 0 {
+            continue;
+        }
+        all.resize(columns * rows, f32::NAN);
+        let good_rows = scratch.decoded.chunks_exact_mut(row_bytes).take(whole_rows.min(segment.rows));
+        for (row, heights) in good_rows.zip(all[here.start * columns..].chunks_exact_mut(columns)) {
             if !image.compression.is_lerc() {
                 restore_row(row, image.kind.size(), file.little, image.predictor, image.interleaved, row_scratch);
             }
@@ -79,7 +84,7 @@ pub(super) fn decode(
             }
         }
     }
-    Chunk { heights, problem }
+    Chunk { heights: all, problem }
 }
 
 fn segments_are_rows(image: &Image) -> bool {

@@ -11,6 +11,13 @@ use super::samples::{Predictor, SampleKind};
 const LARGEST_CHUNK: u64 = 1 << 30;
 /// Rows of uncompressed strips are read in portions of about this many bytes.
 const PORTION: usize = 1 << 18;
+/// A file is believed to hold so many samples for each of its bytes, and `FEW` in any case. Blocks that are all one value
+/// or not stored at all reach some ten thousand.
+const MOST_SAMPLES_PER_BYTE: u64 = 1 << 16;
+const FEW: u64 = 1 << 28;
+/// A file is believed to be so many columns wide for each of its bytes, and `NARROW` in any case, since rows are read whole.
+const MOST_COLUMNS_PER_BYTE: u64 = 16;
+const NARROW: u64 = 1 << 20;
 /// The longest side of an image: the most that is left when an `i32` counts pixels, as in most software that writes them.
 const LONGEST_SIDE: u64 = i32::MAX as u64;
 
@@ -60,6 +67,23 @@ pub(super) enum Compression {
 }
 
 impl Compression {
+    /// How many bytes one encoded byte can stand for at most.
+    pub(super) fn most_expansion(self) -> usize {
+        match self {
+            Compression::None => 1,
+            // Two bytes for a run of 128.
+            Compression::PackBits => 64,
+            // Twelve bits for a string as long as the table.
+            Compression::Lzw => 4096,
+            // Two bits for a match of 258.
+            Compression::Deflate => 1032,
+            // Three bytes for a block of 128 KiB; LZMA's long matches stay below that.
+            Compression::Zstd | Compression::Lzma => 1 << 16,
+            // A constant block is a header, whatever its size.
+            Compression::Lerc | Compression::LercDeflate | Compression::LercZstd => 1 << 24,
+        }
+    }
+
     /// Whether the codec hands out native numbers rather than bytes of the file's order.
     pub(super) fn is_lerc(self) -> bool {
         matches!(self, Compression::Lerc | Compression::LercDeflate | Compression::LercZstd)
@@ -105,19 +129,38 @@ pub(super) struct Segment {
 }
 
 impl Image {
-    /// Understands a directory. The error reads "expected …, got …; what to do".
+    /// Understands the directory of heights. The error reads "expected …, got …; what to do".
     pub(super) fn new(file: &Container, directory: &Directory) -> Result<Image, String> {
+        Image::of_kind(file, directory, kind(file, directory)?)
+    }
+
+    /// Understands the directory of a mask, whose samples may be single bits.
+    pub(super) fn mask(file: &Container, directory: &Directory) -> Result<Image, String> {
+        let bits = file.unsigned(directory, tag::BITS)?.unwrap_or(1);
+        let bands = file.unsigned(directory, tag::BANDS)?.unwrap_or(1);
+        let kind = if bits == 1 && bands == 1 { SampleKind::Bit } else { kind(file, directory)? };
+        Image::of_kind(file, directory, kind)
+    }
+
+    fn of_kind(file: &Container, directory: &Directory, kind: SampleKind) -> Result<Image, String> {
         let number = |tag, name: &str| {
             file.unsigned(directory, tag)?.ok_or_else(|| format!("expected the image's {name} (tag {tag}), got none"))
         };
         let or = |tag, default| Ok::<u64, String>(file.unsigned(directory, tag)?.unwrap_or(default));
         let (columns, rows) = (number(tag::COLUMNS, "width")?, number(tag::ROWS, "height")?);
         let bands = or(tag::BANDS, 1)?;
-        let kind = kind(file, directory)?;
         let area = columns.checked_mul(rows).and_then(|area| area.checked_mul(bands)?.checked_mul(kind.size() as u64));
         if columns.max(rows) > LONGEST_SIDE || area.is_none_or(|area| area > i64::MAX as u64) {
             return Err(format!(
                 "expected a size that a raster can have, got {columns} × {rows}; the header is damaged"
+            ));
+        }
+        let length = file.bytes.length();
+        if columns > NARROW.max(length.saturating_mul(MOST_COLUMNS_PER_BYTE))
+            || columns * rows > FEW.max(length.saturating_mul(MOST_SAMPLES_PER_BYTE))
+        {
+            return Err(format!(
+                "expected a size that {length} bytes can hold, got {columns} × {rows} samples; the header is damaged"
             ));
         }
         if columns == 0 || rows == 0 || bands == 0 || bands > 65_535 {
@@ -188,7 +231,7 @@ impl Image {
             return Err(format!("expected {what}s within the file, got only offsets past its end; it is cut off"));
         }
 
-        let row_bytes = (columns * pixel_bytes) as usize;
+        let row_bytes = if kind == SampleKind::Bit { columns.div_ceil(8) } else { columns * pixel_bytes } as usize;
         let (chunk, strip_rows) = if portioned {
             let portion = (PORTION / row_bytes.max(1)).clamp(1, rows as usize);
             ([columns as usize, portion], Some(chunk_rows as usize))
@@ -223,7 +266,8 @@ impl Image {
 
     /// Bytes of one row of a chunk, all interleaved bands included.
     pub(super) fn row_bytes(&self) -> usize {
-        self.chunk[0] * self.interleaved * self.kind.size()
+        let samples = self.chunk[0] * self.interleaved;
+        if self.kind == SampleKind::Bit { samples.div_ceil(8) } else { samples * self.kind.size() }
     }
 
     /// Columns and rows of a chunk that lie within the image.

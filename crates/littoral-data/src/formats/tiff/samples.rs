@@ -9,6 +9,8 @@ use crate::voids::VoidRule;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub(super) enum SampleKind {
+    /// One bit, eight to a byte, the highest first: masks alone.
+    Bit,
     U8,
     I8,
     U16,
@@ -23,10 +25,10 @@ pub(super) enum SampleKind {
 }
 
 impl SampleKind {
-    /// Bytes of one sample.
+    /// Bytes of one sample; of eight for bits.
     pub(super) fn size(self) -> usize {
         match self {
-            SampleKind::U8 | SampleKind::I8 => 1,
+            SampleKind::Bit | SampleKind::U8 | SampleKind::I8 => 1,
             SampleKind::U16 | SampleKind::I16 | SampleKind::F16 => 2,
             SampleKind::U32 | SampleKind::I32 | SampleKind::F32 => 4,
             SampleKind::U64 | SampleKind::I64 | SampleKind::F64 => 8,
@@ -62,18 +64,13 @@ pub(super) fn restore_row(
 ) {
     let native = little == cfg!(target_endian = "little");
     if predictor == Predictor::Float {
-        for at in interleaved..row.len() {
-            row[at] = row[at].wrapping_add(row[at - interleaved]);
-        }
         scratch.clear();
         scratch.extend_from_slice(row);
-        let samples = row.len() / size;
-        // Plane 0 holds the highest bytes, whatever the byte order of the file.
-        for (plane, bytes) in scratch.chunks_exact(samples).take(size).enumerate() {
-            let place = if cfg!(target_endian = "little") { size - 1 - plane } else { plane };
-            for (out, &byte) in row[place..].iter_mut().step_by(size).zip(bytes) {
-                *out = byte;
-            }
+        match (size, interleaved) {
+            (2, 1) => gather::<2>(scratch, row),
+            (4, 1) => gather::<4>(scratch, row),
+            (8, 1) => gather::<8>(scratch, row),
+            _ => gather_interleaved(scratch, row, size, interleaved),
         }
         return;
     }
@@ -90,6 +87,45 @@ pub(super) fn restore_row(
             2 => accumulate(row, interleaved, u16::from_ne_bytes, u16::wrapping_add, u16::to_ne_bytes),
             4 => accumulate(row, interleaved, u32::from_ne_bytes, u32::wrapping_add, u32::to_ne_bytes),
             _ => accumulate(row, interleaved, u64::from_ne_bytes, u64::wrapping_add, u64::to_ne_bytes),
+        }
+    }
+}
+
+/// Where the byte of a significance, 0 the highest, lies in a native number.
+#[inline(always)]
+fn place(plane: usize, size: usize) -> usize {
+    if cfg!(target_endian = "little") { size - 1 - plane } else { plane }
+}
+
+/// Undoes the floating-point predictor of one sequence. The running sum passes through the planes one after another; each
+/// plane's share of it is known beforehand from the planes' sums, so that all planes run side by side: as many
+/// independent chains of additions, and the numbers are put together on the way.
+fn gather<const N: usize>(planes: &[u8], row: &mut [u8]) {
+    let samples = row.len() / N;
+    let mut planes: [&[u8]; N] = std::array::from_fn(|plane| &planes[plane * samples..][..samples]);
+    let mut sums = [0u8; N];
+    for plane in 1..N {
+        let before = planes[plane - 1].iter().fold(0u8, |sum, &byte| sum.wrapping_add(byte));
+        sums[plane] = sums[plane - 1].wrapping_add(before);
+    }
+    planes = planes.map(|plane| &plane[..samples]);
+    for (at, number) in row.as_chunks_mut::<N>().0.iter_mut().enumerate().take(samples) {
+        for plane in 0..N {
+            sums[plane] = sums[plane].wrapping_add(planes[plane][at]);
+            number[place(plane, N)] = sums[plane];
+        }
+    }
+}
+
+/// The same by the book, for sequences that lie interleaved.
+fn gather_interleaved(planes: &mut [u8], row: &mut [u8], size: usize, interleaved: usize) {
+    for at in interleaved..planes.len() {
+        planes[at] = planes[at].wrapping_add(planes[at - interleaved]);
+    }
+    // Plane 0 holds the highest bytes, whatever the byte order of the file.
+    for (plane, bytes) in planes.chunks_exact(row.len() / size).take(size).enumerate() {
+        for (out, &byte) in row[place(plane, size)..].iter_mut().step_by(size).zip(bytes) {
+            *out = byte;
         }
     }
 }
@@ -139,6 +175,11 @@ pub(super) fn heights_of_row(row: &[u8], kind: SampleKind, stride: usize, rule: 
         }
     }
     match kind {
+        SampleKind::Bit => {
+            for (at, height) in heights.iter_mut().enumerate() {
+                *height = row.get(at / 8).map_or(f32::NAN, |byte| f32::from(byte >> (7 - at % 8) & 1));
+            }
+        }
         SampleKind::U8 => each(row, stride, rule, heights, |b: [u8; 1]| b[0].into()),
         SampleKind::I8 => each(row, stride, rule, heights, |b| i8::from_ne_bytes(b).into()),
         SampleKind::U16 => each(row, stride, rule, heights, |b| u16::from_ne_bytes(b).into()),

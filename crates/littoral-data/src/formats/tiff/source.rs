@@ -26,8 +26,10 @@ pub(super) struct TiffSource {
     path: PathBuf,
     /// The file, and the one with overviews beside it.
     containers: Vec<Container>,
-    /// For each level the container it lies in, and its layout.
+    /// For each level the container it lies in, and its layout; behind the levels their masks.
     images: Vec<(usize, Image)>,
+    /// For each level the place of its mask among the images, if it has one: 0 there is void.
+    masks: Vec<Option<usize>>,
     levels: Vec<Level>,
     info: Info,
     rule: VoidRule,
@@ -59,11 +61,10 @@ impl TiffSource {
         let (directories, chain_warning) = file.directories().map_err(error)?;
         let mut warnings: Vec<String> = chain_warning.into_iter().collect();
 
-        let role = |index: usize| {
-            let directory = directories.get(index)?;
-            file.unsigned(directory, tag::NEW_SUBFILE_TYPE).ok().flatten()
-        };
-        let main = (0..directories.len()).find(|&index| role(index).unwrap_or(0) & 5 == 0).unwrap_or(0);
+        // Bit 0 says a smaller version, bit 2 a mask.
+        let role = |directory| file.unsigned(directory, tag::NEW_SUBFILE_TYPE).ok().flatten().unwrap_or(0) & 5;
+        let roles: Vec<u64> = directories.iter().map(role).collect();
+        let main = roles.iter().position(|&role| role == 0).unwrap_or(0);
         let directory = &directories[main];
         let image = Image::new(&file, directory).map_err(error)?;
 
@@ -112,20 +113,16 @@ impl TiffSource {
         if matches!(image.kind, SampleKind::U8 | SampleKind::I8) {
             warnings.push(format!("8-bit samples: heights come in steps of {step} m"));
         }
-        let full_size = role(main).unwrap_or(0) & 5 == 0;
-        let others = directories.len() - (0..directories.len()).filter(|&i| role(i).unwrap_or(0) & 5 != 0).count();
-        if full_size && others > 1 {
-            warnings.push(format!("{others} images in one file: the first is read"));
+        let whole = roles.iter().filter(|&&role| role == 0).count();
+        if whole > 1 {
+            warnings.push(format!("{whole} images in one file: the first is read"));
         }
 
         let mut images = vec![(0, image)];
-        for index in (0..directories.len()).filter(|&index| index != main) {
-            // Bit 0: a smaller version; bit 2: a mask.
-            if role(index).unwrap_or(0) & 5 == 1 {
-                match Image::new(&file, &directories[index]) {
-                    Ok(image) => images.push((0, image)),
-                    Err(problem) => warnings.push(format!("an overview is left out: {problem}")),
-                }
+        for (directory, _) in directories.iter().zip(&roles).filter(|(_, role)| **role == 1) {
+            match Image::new(&file, directory) {
+                Ok(image) => images.push((0, image)),
+                Err(problem) => warnings.push(format!("an overview is left out: {problem}")),
             }
         }
         let mut containers = vec![file];
@@ -135,8 +132,25 @@ impl TiffSource {
             containers.push(outside);
         }
         keep_overviews(&mut images);
+        // A mask belongs to the level of its size.
+        let mut masks = vec![None; images.len()];
+        for (directory, _) in directories.iter().zip(&roles).filter(|(_, role)| **role & 4 != 0) {
+            match Image::mask(&containers[0], directory) {
+                Ok(mask) => {
+                    let level = (0..masks.len()).find(|&level| {
+                        let image = &images[level].1;
+                        image.columns == mask.columns && image.rows == mask.rows && masks[level].is_none()
+                    });
+                    if let Some(level) = level {
+                        masks[level] = Some(images.len());
+                        images.push((0, mask));
+                    }
+                }
+                Err(problem) => warnings.push(format!("a mask is left out: {problem}")),
+            }
+        }
         let levels: Vec<Level> =
-            images.iter().map(|(_, image)| Level { columns: image.columns, rows: image.rows }).collect();
+            images[..masks.len()].iter().map(|(_, image)| Level { columns: image.columns, rows: image.rows }).collect();
         let mut info = Info {
             format: "GTiff",
             columns: levels[0].columns,
@@ -153,6 +167,7 @@ impl TiffSource {
             path,
             containers,
             images,
+            masks,
             levels,
             info,
             rule,
@@ -211,7 +226,7 @@ impl TiffSource {
             );
             set_warning(&mut self.info.warnings, &mut self.broken_warning, text);
         }
-        let sparse = decoded.heights.is_empty() && decoded.problem.is_none();
+        let sparse = decoded.heights.is_empty() && decoded.problem.is_none() && level < self.levels.len();
         if sparse && self.rule.nodata.is_none() && self.missing.insert((level, chunk)) {
             let text = format!("{} of {total} chunks are not stored in the file and void", self.missing.len());
             set_warning(&mut self.info.warnings, &mut self.missing_warning, text);
@@ -242,9 +257,24 @@ impl Source for TiffSource {
                 format!("expected a window within {columns} × {rows} samples, got {window:?}"),
             ));
         }
+        let mut heights = self.read_image(level, window, self.rule);
+        if let Some(mask) = self.masks[level] {
+            let mask = self.read_image(mask, window, VoidRule::default());
+            for (height, mask) in heights.iter_mut().zip(mask) {
+                // What is not stored of a mask is 0 like what is masked.
+                *height = if mask > 0.0 { *height } else { f32::NAN };
+            }
+        }
+        Ok(heights)
+    }
+}
+
+impl TiffSource {
+    /// Samples of a window of a level or a mask; NaN where there are none.
+    fn read_image(&mut self, level: usize, window: Window, rule: VoidRule) -> Vec<f32> {
         let mut out = vec![f32::NAN; window.columns * window.rows];
         if out.is_empty() {
-            return Ok(out);
+            return out;
         }
         let image = &self.images[level].1;
         let across = window.column / image.chunk[0]..(window.column + window.columns).div_ceil(image.chunk[0]);
@@ -270,7 +300,7 @@ impl Source for TiffSource {
                 .par_iter()
                 .map_init(
                     || (Scratch::default(), Vec::new(), Vec::new()),
-                    |work, &chunk| decode(file, image, chunk, &self.rule, work),
+                    |work, &chunk| decode(file, image, chunk, &rule, work),
                 )
                 .collect();
             for (&chunk, decoded) in batch.iter().zip(decoded) {
@@ -290,7 +320,7 @@ impl Source for TiffSource {
                 }
             }
         }
-        Ok(out)
+        out
     }
 }
 

@@ -1,0 +1,284 @@
+//! A height file as ground to stand on, in the file's coordinates and in local metres.
+
+use crate::talk::{Failure, Talk, progress, tidy};
+use glam::{DAffine2, DVec2};
+use littoral::field::{Land, Raster, Window};
+use littoral_data::{Crs, Dem, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
+use std::path::{Path, PathBuf};
+
+/// An opened height file.
+pub struct Opened {
+    /// Its name.
+    pub file: PathBuf,
+    /// How its coordinates and local metres belong together.
+    pub frame: Frame,
+    source: Box<dyn Source>,
+}
+
+/// How a file's coordinates and local metres belong together.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    georeference: Georeference,
+    local_from_sample: DAffine2,
+    crs_from_local: DAffine2,
+    local_from_crs: DAffine2,
+}
+
+/// Coordinates as typed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum System {
+    /// Those of the file.
+    File,
+    /// Longitude and latitude in degrees.
+    LonLat,
+}
+
+impl System {
+    /// By the flag `--lonlat`.
+    pub fn of(lonlat: bool) -> System {
+        if lonlat { System::LonLat } else { System::File }
+    }
+}
+
+impl Opened {
+    /// Opens a file and passes on what its reader noticed.
+    pub fn open(file: &Path, talk: &mut Talk) -> Result<Opened, Failure> {
+        let source = littoral_data::open(file)?;
+        let info = source.info();
+        let opened = Opened { file: file.to_owned(), frame: Frame::of(&info.georeference), source };
+        opened.pass_on(&opened.info().warnings.clone(), talk);
+        opened.pass_on(&opened.info().georeference.warnings(), talk);
+        Ok(opened)
+    }
+
+    /// Warns of what came up since.
+    fn pass_on(&self, warnings: &[String], talk: &mut Talk) {
+        for warning in warnings {
+            talk.warn(format!("{}: {warning}", self.file.display()));
+        }
+    }
+
+    /// What the file is.
+    pub fn info(&self) -> &Info {
+        self.source.info()
+    }
+
+    /// The resolutions held, the full one first.
+    pub fn levels(&self) -> &[littoral_data::Level] {
+        self.source.levels()
+    }
+
+    /// What reading every sample tells.
+    pub fn survey(&mut self, talk: &mut Talk) -> Result<Survey, Failure> {
+        let bar = progress(1000, "reading");
+        let survey = littoral_data::survey(&mut *self.source, &|done| bar.set_position((done * 1000.0) as u64))?;
+        bar.finish_and_clear();
+        self.pass_on(&self.info().warnings.clone(), talk);
+        Ok(survey)
+    }
+
+    /// The whole file as land, at full resolution.
+    pub fn whole(&mut self, talk: &mut Talk) -> Result<Land, Failure> {
+        let (columns, rows) = (self.info().columns, self.info().rows);
+        self.part(Window { column: 0, row: 0, columns, rows }, talk)
+    }
+
+    /// A window of the file as land, at full resolution, in the local metres of the whole file. It may be all void.
+    pub fn part(&mut self, window: Window, talk: &mut Talk) -> Result<Land, Failure> {
+        let Window { columns, rows, .. } = window;
+        let mut heights = self.source.read(0, window)?;
+        self.pass_on(&self.info().warnings.clone(), talk);
+        let [flip_columns, flip_rows] = self.frame.georeference.flips();
+        if flip_rows {
+            for row in 0..rows / 2 {
+                let (upper, lower) = heights.split_at_mut((rows - 1 - row) * columns);
+                upper[row * columns..(row + 1) * columns].swap_with_slice(&mut lower[..columns]);
+            }
+        }
+        if flip_columns {
+            heights.chunks_exact_mut(columns).for_each(<[f32]>::reverse);
+        }
+        let raster =
+            Raster::new(columns, rows, self.frame.spacing(), heights).map_err(|e| self.failure(&e.to_string()))?;
+        let column = if flip_columns { window.column + columns - 1 } else { window.column };
+        let row = if flip_rows { window.row + rows - 1 } else { window.row };
+        let corner = self.frame.local_from_sample.transform_point2(DVec2::new(column as f64, row as f64));
+        Ok(Land::at(raster, corner))
+    }
+
+    /// The file as land at a resolution of at most so many samples, and the frame of that.
+    pub fn fitting(&mut self, most_samples: usize, talk: &mut Talk) -> Result<(Land, Frame), Failure> {
+        let bar = progress(1000, "reading");
+        let told = |done: f32| bar.set_position((done * 1000.0) as u64);
+        let dem = littoral_data::load_from(&mut *self.source, &self.file, LoadOptions { most_samples }, &told)?;
+        bar.finish_and_clear();
+        self.pass_on(&dem.info.warnings, talk);
+        let Dem { raster, georeference, .. } = dem;
+        Ok((Land::new(raster), Frame::of(&georeference)))
+    }
+
+    /// The smallest window whose patches hold all the local positions, with a sample to spare; at least 2 × 2.
+    pub fn window_of(&self, positions: impl IntoIterator<Item = DVec2>) -> Window {
+        let samples = self.frame.local_from_sample.inverse();
+        let last = self.frame.last();
+        let (mut low, mut high) = (last, DVec2::ZERO);
+        for position in positions {
+            let sample = samples.transform_point2(position);
+            (low, high) = (low.min(sample), high.max(sample));
+        }
+        let low = (low.floor() - 1.0).clamp(DVec2::ZERO, last - 1.0);
+        let high = (high.ceil() + 1.0).max(low + 1.0).min(last);
+        let size = high - low + 1.0;
+        Window { column: low.x as usize, row: low.y as usize, columns: size.x as usize, rows: size.y as usize }
+    }
+
+    /// A failure with the file's name.
+    pub fn failure(&self, problem: &str) -> Failure {
+        Failure::Work(format!("{}: {problem}", self.file.display()))
+    }
+
+    /// Local metres of typed coordinates.
+    pub fn local(&self, system: System, at: DVec2) -> Result<DVec2, Failure> {
+        self.frame.local(system, at).map_err(|e| self.failure(&e))
+    }
+
+    /// Says that a position lies outside, in a way that helps to find the mistake.
+    pub fn outside(&self, system: System, at: DVec2) -> String {
+        let (low, high) = self.frame.bounds();
+        let degrees = at.x.abs() <= 360.0 && at.y.abs() <= 90.0;
+        let within = |p: DVec2| p.cmpge(low).all() && p.cmple(high).all();
+        let advice = match (&self.info().georeference.crs, system) {
+            (_, System::File) if within(DVec2::new(at.y, at.x)) => "swap X and Y",
+            (Crs::Projected { .. }, System::File) if degrees => "if these are degrees, add --lonlat",
+            (Crs::Projected { .. }, System::LonLat) if !degrees => "leave out --lonlat",
+            _ => "choose one within",
+        };
+        format!(
+            "expected a position within the data, X {} to {} and Y {} to {}, got {},{}; {advice}",
+            self.frame.shown(low.x),
+            self.frame.shown(high.x),
+            self.frame.shown(low.y),
+            self.frame.shown(high.y),
+            at.x,
+            at.y
+        )
+    }
+
+    /// What the heights are counted from, in words.
+    pub fn datum(&self) -> String {
+        match &self.info().vertical_datum {
+            VerticalDatum::Unknown => "heights taken as above sea level (the file does not say)".to_owned(),
+            VerticalDatum::Named(name) => format!("heights above {name}"),
+        }
+    }
+}
+
+impl Frame {
+    /// The frame of a raster.
+    pub fn of(georeference: &Georeference) -> Frame {
+        Frame {
+            local_from_sample: georeference.local_from_sample(),
+            crs_from_local: georeference.crs_from_local(),
+            local_from_crs: georeference.local_from_crs(),
+            georeference: georeference.clone(),
+        }
+    }
+
+    /// The frame of land that is given in metres alone.
+    pub fn metres() -> Frame {
+        Frame {
+            georeference: Georeference::none(2, 2),
+            local_from_sample: DAffine2::IDENTITY,
+            crs_from_local: DAffine2::IDENTITY,
+            local_from_crs: DAffine2::IDENTITY,
+        }
+    }
+
+    fn last(&self) -> DVec2 {
+        let [columns, rows] = self.georeference.size;
+        DVec2::new(columns as f64 - 1.0, rows as f64 - 1.0)
+    }
+
+    /// Where everything lies.
+    pub fn georeference(&self) -> &Georeference {
+        &self.georeference
+    }
+
+    /// Distance between samples (m).
+    pub fn spacing(&self) -> DVec2 {
+        self.georeference.spacing()
+    }
+
+    /// Local metres of coordinates.
+    pub fn local(&self, system: System, at: DVec2) -> Result<DVec2, String> {
+        let crs = match system {
+            System::File => self.georeference.near(at),
+            System::LonLat => self.georeference.crs_from_lonlat(at)?,
+        };
+        Ok(self.local_from_crs.transform_point2(crs))
+    }
+
+    /// The file's coordinates of local metres.
+    pub fn crs(&self, local: DVec2) -> DVec2 {
+        self.crs_from_local.transform_point2(local)
+    }
+
+    /// Whether a local position lies within the samples, but for rounding.
+    pub fn holds(&self, local: DVec2) -> bool {
+        let sample = self.local_from_sample.inverse().transform_point2(local);
+        sample.cmpge(DVec2::splat(-1e-6)).all() && sample.cmple(self.last() + 1e-6).all()
+    }
+
+    /// The lowest and highest coordinates of samples.
+    pub fn bounds(&self) -> (DVec2, DVec2) {
+        let (last, crs) = (self.last(), self.georeference.crs_from_sample());
+        let corners = [DVec2::ZERO, DVec2::new(last.x, 0.0), DVec2::new(0.0, last.y), last];
+        let corners = corners.map(|corner| crs.transform_point2(corner));
+        (corners.into_iter().fold(corners[0], DVec2::min), corners.into_iter().fold(corners[0], DVec2::max))
+    }
+
+    /// A coordinate as it is worth showing.
+    pub fn shown(&self, coordinate: f64) -> String {
+        tidy(coordinate, self.decimals())
+    }
+
+    /// Decimals that make a coordinate good to a centimetre or so.
+    pub fn decimals(&self) -> usize {
+        if matches!(self.georeference.crs, Crs::Geographic { .. }) { 7 } else { 2 }
+    }
+
+    /// The latitude of the middle (degrees), where it can be known.
+    pub fn latitude(&self) -> Option<f64> {
+        self.georeference.lonlat_from_crs(self.georeference.middle()).ok().map(|lonlat| lonlat.y)
+    }
+
+    /// The angle from the land's y axis clockwise to true north (rad).
+    pub fn north(&self) -> f64 {
+        -self.georeference.true_north()
+    }
+}
+
+/// Exact height (m) of the surface below a local position (m); `None` where void or outside. A position that is a
+/// sample's but for rounding (a millionth of a cell, as typed decimals leave it) is that sample's: on the data's border it
+/// does not fall outside, and next to a void it does not ask the void.
+pub fn height_at(land: &Land, local: DVec2) -> Option<f32> {
+    let raster = land.raster();
+    let last = DVec2::new((raster.columns() - 1) as f64, (raster.rows() - 1) as f64);
+    let lattice = (local - land.origin()) / raster.spacing();
+    let snap = |at: f64| if (at - at.round()).abs() < 1e-6 { at.round() } else { at };
+    let lattice = DVec2::new(snap(lattice.x), snap(lattice.y));
+    if !(lattice.cmpge(DVec2::ZERO).all() && lattice.cmple(last).all()) {
+        return None;
+    }
+    let base = lattice.floor();
+    let (f, column, row) = (lattice - base, base.x as usize, base.y as usize);
+    let corners =
+        [(0, 0, (1.0 - f.x) * (1.0 - f.y)), (1, 0, f.x * (1.0 - f.y)), (0, 1, (1.0 - f.x) * f.y), (1, 1, f.x * f.y)];
+    let mut height = 0.0;
+    for (i, j, weight) in corners {
+        if weight > 0.0 {
+            height += weight * f64::from(raster.sample(column + i, row + j)?);
+        }
+    }
+    Some(height as f32)
+}

@@ -1,0 +1,569 @@
+//! `littoral render`: pictures and films.
+
+use crate::film;
+use crate::ground::{Frame, Opened, System, height_at};
+use crate::input::{self, Target, WaterLevel};
+use crate::talk::{Failure, Talk, progress, seconds, tidy};
+use clap::ValueEnum;
+use glam::{DVec2, DVec3, UVec2, Vec2};
+use littoral::field::{Land, coast};
+use littoral::picture::{self, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water};
+use littoral::space::{Ray, View};
+use littoral_data::write::{self, Layer, PngPixels};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Make a picture, or with --path a film.
+///
+/// Without FILE the built-in coast is drawn. Without --eye a good view is chosen by itself, and the line that is printed
+/// holds it in the file's coordinates, ready to be copied and changed.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  littoral render                                          the built-in coast, into littoral.png
+  littoral render dem.tif                                  your land, from a view chosen by itself
+  littoral render dem.tif --sun 240,12 --size 1920x1080 --out evening.png
+  littoral render dem.tif --eye 562300,5107000,3200 --look 562300,5115800,1900
+  littoral render dem.tif --eye 562300,5107000,2 --look 562300,5115800 --above
+  littoral render dem.tif --style image --texture ortho.tif
+  littoral render dem.tif --out linear.exr --passes depth,normal
+  littoral render dem.tif --path                           a film: once round the land
+  littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
+  littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4
+
+A film ending in .mp4 needs ffmpeg and is written when it is complete. A film whose --out is a folder is written frame
+by frame: when interrupted, the same command goes on where it stopped.")]
+pub struct Render {
+    /// A height file of any known format; none for the built-in coast
+    #[arg(value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// The file to write: .png, .exr (linear light); for films .mp4, .mov, .mkv or a folder for frames
+    /// [default: littoral.png, littoral.mp4]
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Width and height of the picture in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = input::size, default_value = "1280x720")]
+    size: UVec2,
+
+    /// Where the eye is; Z in metres above sea level [default: chosen by itself]
+    #[arg(long, value_name = "X,Y,Z", value_parser = input::xyz, help_heading = "View")]
+    eye: Option<DVec3>,
+    /// Where it looks; without Z at the ground [default: the middle of the land]
+    #[arg(long, value_name = "X,Y[,Z]", value_parser = input::target, requires = "eye", help_heading = "View")]
+    look: Option<Target>,
+    /// Count Z of --eye and --look from the ground below
+    #[arg(long, requires = "eye", help_heading = "View")]
+    above: bool,
+    /// Coordinates are longitude and latitude in degrees
+    #[arg(long, help_heading = "View")]
+    lonlat: bool,
+    /// Angle between the picture's lower and upper edge in degrees
+    #[arg(long, value_name = "DEGREES", value_parser = input::field_of_view, help_heading = "View")]
+    fov: Option<f64>,
+
+    /// How the ground is coloured [default: what suits the land]
+    #[arg(long, value_enum, help_heading = "Look")]
+    style: Option<StyleName>,
+    /// A picture to lay over the ground (.tif, .png, .jpg); where it has no place of its own, over all of it
+    #[arg(long, value_name = "IMAGE", help_heading = "Look")]
+    texture: Option<PathBuf>,
+    /// The sun: compass bearing and height above the horizon in degrees [default: what suits the land]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = input::sun, help_heading = "Look")]
+    sun: Option<DVec2>,
+    /// Stretch all heights, the eye's too
+    #[arg(long, value_name = "FACTOR", value_parser = input::factor, default_value = "1", help_heading = "Look")]
+    exaggeration: f64,
+    /// Height of still water in metres, or none. It covers low ground that it can reach from the border of the data
+    #[arg(long, value_name = "METRES|none", value_parser = input::water, default_value = "0", help_heading = "Look")]
+    water: WaterLevel,
+    /// How far one sees: 10 in haze, 40 on a clear day, 200 in the clearest air [default: what suits the land]
+    #[arg(long, value_name = "KILOMETRES", value_parser = input::positive, help_heading = "Look")]
+    visibility: Option<f64>,
+
+    /// Also depth, normal, position, height of what is seen, as floating point: into --out if that is an .exr, else into
+    /// an .exr beside it. Distances in metres; positions relative to the eye, X east, Y north, Z up
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "PASS,…", help_heading = "Quality")]
+    passes: Vec<Pass>,
+    /// Rays through each pixel: more is smoother and slower
+    #[arg(long, value_name = "N", default_value = "12", value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Quality")]
+    samples: u32,
+    /// Which random pattern the rays follow; the same seed gives the same picture to the bit
+    #[arg(long, value_name = "N", default_value = "0", help_heading = "Quality")]
+    seed: u32,
+    /// Use all samples of the file, however many; otherwise files of more than 16 million are drawn coarser
+    #[arg(long, help_heading = "Quality")]
+    full: bool,
+
+    /// A film along a path: a path file, or orbit (also without a value) for once round the land
+    #[arg(long, value_name = "FILE|orbit", num_args = 0..=1, default_missing_value = "orbit", help_heading = "Film")]
+    path: Option<PathBuf>,
+    /// Length of the film in seconds [default: the path's own; orbit: 12]
+    #[arg(long, value_name = "S", value_parser = input::positive, requires = "path", help_heading = "Film")]
+    seconds: Option<f64>,
+    /// Frames a second
+    #[arg(long, value_name = "F", default_value = "30", value_parser = fps, help_heading = "Film")]
+    fps: f64,
+    /// Save the path as text, to be edited
+    #[arg(long, value_name = "FILE.toml", requires = "path", help_heading = "Film")]
+    save_path: Option<PathBuf>,
+}
+
+fn fps(text: &str) -> Result<f64, String> {
+    input::within(text, 0.01, 1000.0, "0.01 to 1000 frames a second")
+}
+
+/// How the ground is coloured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum StyleName {
+    /// Rock, scree, grass, woods, sand and snow
+    Natural,
+    /// Colours by height
+    Tint,
+    /// A cartographer's shaded relief
+    Relief,
+    /// The picture of --texture
+    Image,
+}
+
+/// What else is known of each pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Pass {
+    /// Distance from the eye (m)
+    Depth,
+    /// Unit normal
+    Normal,
+    /// Position relative to the eye (m)
+    Position,
+    /// Height (m)
+    Height,
+}
+
+/// At most so many samples are drawn without `--full`.
+const FITTING: usize = 16 << 20;
+
+/// What is drawn: land and all that belongs to it.
+pub struct Subject {
+    /// What it is called.
+    pub name: String,
+    /// The ground, heights stretched.
+    pub land: Land,
+    /// The water.
+    pub water: Option<Water>,
+    /// How coordinates and local metres belong together.
+    pub frame: Frame,
+    /// What heights are counted from, in words.
+    pub datum: String,
+    /// By how much heights are stretched.
+    pub exaggeration: f64,
+}
+
+#[derive(Serialize)]
+struct Answer {
+    file: String,
+    width: u32,
+    height: u32,
+    seconds: f64,
+    eye: [f64; 3],
+    look: [f64; 3],
+    fov: f64,
+    sun: [f64; 2],
+    style: String,
+    exaggeration: f64,
+    datum: String,
+    samples: u32,
+    seed: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    passes: Option<String>,
+}
+
+impl Render {
+    /// Runs the command.
+    pub fn run(mut self, talk: &mut Talk) -> Result<(), Failure> {
+        let started = Instant::now();
+        self.untangle()?;
+        let file = self.files.first().cloned();
+        let out = self.output()?;
+        let inputs: Vec<&Path> =
+            [file.as_deref(), self.texture.as_deref(), self.path.as_deref()].into_iter().flatten().collect();
+        check_output(&out.file, &inputs)?;
+        if let Some(save) = &self.save_path {
+            check_output(save, &inputs)?;
+        }
+
+        let subject = self.subject(file.as_deref(), talk)?;
+        let (shot, look) = self.shot(&subject, file.is_none(), talk)?;
+        let drape = self.texture.as_ref().map(|texture| drape(texture, &subject, talk)).transpose()?;
+        let scene = Scene {
+            drape: drape.as_ref(),
+            climate: climate(&subject.frame),
+            north: subject.frame.north(),
+            ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
+        };
+        let stage = Stage::new(&scene);
+        let settings = Settings { samples: self.samples, seed: self.seed };
+        if self.path.is_some() {
+            let order = film::Order {
+                path: self.path.as_deref().filter(|p| *p != Path::new("orbit")),
+                seconds: self.seconds,
+                fps: self.fps,
+                save: self.save_path.as_deref(),
+                out: &out.file,
+                folder: out.kind == Kind::Frames,
+                look: format!("{:?} {:?} {:?} water {:?}", shot.sun, shot.air, shot.style, self.water),
+                field: shot.field,
+                size: self.size,
+            };
+            return order.run(&subject, &stage, &settings, started, talk);
+        }
+
+        let bar = progress(1000, "rendering");
+        let picture = stage.render(&shot.view, &settings, &|done| bar.set_position((done * 1000.0) as u64));
+        bar.finish_and_clear();
+        let passes = self.save(&picture, &out, &subject)?;
+
+        let (eye, look) = (subject.given(shot.view.eye), subject.given(look));
+        let elapsed = started.elapsed().as_secs_f64();
+        if talk.json() {
+            return talk.print_json(Answer {
+                file: out.file.display().to_string(),
+                width: self.size.x,
+                height: self.size.y,
+                seconds: elapsed,
+                eye: eye.to_array(),
+                look: look.to_array(),
+                fov: shot.field.to_degrees(),
+                sun: [shot.sun.azimuth.to_degrees(), shot.sun.elevation.to_degrees()],
+                style: format!("{:?}", shot.style).to_lowercase(),
+                exaggeration: self.exaggeration,
+                datum: subject.datum,
+                samples: self.samples,
+                seed: self.seed,
+                passes: passes.map(|p| p.display().to_string()),
+            });
+        }
+        let also = passes.map_or(String::new(), |p| format!(" (passes in {})", p.display()));
+        talk.print(format!(
+            "{}: {}x{} in {}{also}, --eye {} --look {} --fov {}, exaggeration {}, {}\n",
+            out.file.display(),
+            self.size.x,
+            self.size.y,
+            seconds(elapsed),
+            subject.shown(eye),
+            subject.shown(look),
+            tidy(shot.field.to_degrees(), 1),
+            tidy(self.exaggeration, 2),
+            subject.datum
+        ))
+    }
+
+    /// Sorts out what a parser cannot: `--path dem.tif` without another file means the file, and an orbit.
+    fn untangle(&mut self) -> Result<(), Failure> {
+        let is_path = |p: &Path| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        if let Some(path) = &self.path
+            && self.files.is_empty()
+            && path != Path::new("orbit")
+            && !is_path(path)
+        {
+            self.files.push(path.clone());
+            self.path = Some("orbit".into());
+        }
+        if let [_, second, ..] = &self.files[..] {
+            let second = second.display();
+            return Err(Failure::Usage(format!("{second}: expected one height file, got several; name only one")));
+        }
+        match (self.style, &self.texture) {
+            (Some(StyleName::Image), None) => {
+                Err(Failure::Usage("expected a picture for --style image, got none; add --texture IMAGE".into()))
+            }
+            (None, Some(_)) => {
+                self.style = Some(StyleName::Image);
+                Ok(())
+            }
+            (Some(style), Some(_)) if style != StyleName::Image => Err(Failure::Usage(format!(
+                "expected --style image with --texture, got {}; remove one",
+                format!("{style:?}").to_lowercase()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn output(&self) -> Result<Output, Failure> {
+        let film = self.path.is_some();
+        let Some(out) = &self.out else {
+            return Ok(match (film, film && !write::ffmpeg_installed()) {
+                (false, _) => Output { file: "littoral.png".into(), kind: Kind::Png },
+                (true, false) => Output { file: "littoral.mp4".into(), kind: Kind::Film },
+                (true, true) => Output { file: "littoral_frames".into(), kind: Kind::Frames },
+            });
+        };
+        let ending = out.extension().and_then(|e| e.to_str()).map(str::to_lowercase);
+        let kind = match (film, ending.as_deref()) {
+            (true, _) if out.is_dir() => Kind::Frames,
+            (false, Some("png")) => Kind::Png,
+            (false, Some("exr")) => Kind::Exr,
+            (true, Some("mp4" | "mov" | "mkv")) => Kind::Film,
+            (true, None) => Kind::Frames,
+            (false, Some("mp4" | "mov" | "mkv")) => {
+                let file = out.display();
+                return Err(Failure::Usage(format!("{file}: expected --path for a film, got none; add --path")));
+            }
+            _ => {
+                let allowed = if film { ".mp4, .mov, .mkv or a folder" } else { ".png or .exr" };
+                let got = ending.map_or("none".to_owned(), |e| format!(".{e}"));
+                let file = out.display();
+                return Err(Failure::Usage(format!(
+                    "{file}: expected a name ending in {allowed}, got {got}; change it"
+                )));
+            }
+        };
+        if film && !self.passes.is_empty() {
+            return Err(Failure::Usage(
+                "expected --passes with a picture, got a film; remove --passes or --path".into(),
+            ));
+        }
+        Ok(Output { file: out.clone(), kind })
+    }
+
+    fn subject(&self, file: Option<&Path>, talk: &mut Talk) -> Result<Subject, Failure> {
+        let (name, land, frame, datum) = match file {
+            None => {
+                ("the built-in coast".to_owned(), coast::coast(), Frame::metres(), "heights above its sea level".into())
+            }
+            Some(file) => {
+                let (land, frame, datum) = self.loaded(file, talk)?;
+                (file.display().to_string(), land, frame, datum)
+            }
+        };
+        let land = match self.exaggeration {
+            1.0 => land,
+            factor => {
+                let origin = land.origin();
+                Land::at(land.raster().clone().exaggerated(factor as f32), origin)
+            }
+        };
+        let water = match self.water {
+            WaterLevel::None => None,
+            WaterLevel::At(level) => Water::flood(&land, level * self.exaggeration),
+        };
+        Ok(Subject { name, land, water, frame, datum, exaggeration: self.exaggeration })
+    }
+
+    /// Land at a resolution that fits a picture.
+    fn loaded(&self, file: &Path, talk: &mut Talk) -> Result<(Land, Frame, String), Failure> {
+        let mut opened = Opened::open(file, talk)?;
+        let (land, frame) = opened.fitting(if self.full { usize::MAX } else { FITTING }, talk)?;
+        Ok((land, frame, opened.datum()))
+    }
+
+    /// The view, and the point it looks at.
+    fn shot(&self, subject: &Subject, built_in: bool, talk: &mut Talk) -> Result<(Framed, DVec3), Failure> {
+        let (land, water) = (&subject.land, subject.water.as_ref());
+        let chosen = match built_in {
+            true => picture::coast_shot(self.size),
+            false => picture::compose(land, water, self.size),
+        };
+        let own_field = 2.0 * (0.5 * f64::from(self.size.y) / f64::from(chosen.view.pixels_per_radian)).atan();
+        let field = self.fov.map_or(if self.eye.is_some() { 45f64.to_radians() } else { own_field }, f64::to_radians);
+        let Shot { mut view, mut sun, mut air, mut style } = chosen;
+        let look = match self.eye {
+            Some(eye) => {
+                let (eye, look) = (self.eye_position(subject, eye, talk)?, self.target(subject)?);
+                view = View::looking_at(eye, look, field as f32, self.size);
+                look
+            }
+            None => {
+                let ahead = view.direction(0.5 * self.size.as_vec2()).as_dvec3();
+                let look = land
+                    .first_hit(&Ray::new(view.eye, ahead))
+                    .map_or_else(|| view.eye + ahead * 0.5 * land.extent().max_element(), |hit| hit.position);
+                if self.fov.is_some() {
+                    view = View::looking_at(view.eye, look, field as f32, self.size);
+                }
+                look
+            }
+        };
+        if let Some(given) = self.sun {
+            sun = Sun::new(given.x.to_radians(), given.y.to_radians());
+        }
+        if let Some(kilometres) = self.visibility {
+            air.visibility = kilometres * 1000.0;
+            air.veils_distance = true;
+        }
+        if let Some(name) = self.style {
+            style = match name {
+                StyleName::Natural => picture::Style::Natural,
+                StyleName::Tint => picture::Style::Tint,
+                StyleName::Relief => picture::Style::Relief,
+                StyleName::Image => picture::Style::Image,
+            };
+        }
+        Ok((Framed { shot: Shot { view, sun, air, style }, field }, look))
+    }
+
+    fn eye_position(&self, subject: &Subject, eye: DVec3, talk: &mut Talk) -> Result<DVec3, Failure> {
+        let local = subject.local(System::of(self.lonlat), eye.truncate())?;
+        let ground = subject.surface(local);
+        let z = match (self.above, ground) {
+            (false, _) => eye.z * self.exaggeration,
+            (true, Some(ground)) => ground + eye.z * self.exaggeration,
+            (true, None) => {
+                let at = format!("{},{}", eye.x, eye.y);
+                let name = &subject.name;
+                return Err(Failure::Work(format!(
+                    "{name}: expected ground below --eye {at} to count from, got none (void or outside); leave out --above"
+                )));
+            }
+        };
+        if let Some(ground) = ground.filter(|&ground| z < ground) {
+            let below = tidy((ground - z) / self.exaggeration, 1);
+            talk.warn(format!("{}: the eye is {below} m below the ground; raise it, or add --above", subject.name));
+        }
+        Ok(local.extend(z))
+    }
+
+    fn target(&self, subject: &Subject) -> Result<DVec3, Failure> {
+        let Some(look) = self.look else {
+            let middle = subject.land.origin() + 0.5 * subject.land.extent();
+            let range = subject.land.height_range();
+            let ground = subject.surface(middle).unwrap_or(0.5 * f64::from(range.low + range.high));
+            return Ok(middle.extend(ground));
+        };
+        let local = subject.local(System::of(self.lonlat), look.xy)?;
+        let ground = subject.surface(local);
+        let z = match (look.z, self.above) {
+            (Some(z), false) => z * self.exaggeration,
+            (z, _) => ground.unwrap_or(0.0) + z.unwrap_or(0.0) * self.exaggeration,
+        };
+        Ok(local.extend(z))
+    }
+
+    /// Writes the picture; the name of the file with the passes, if that is another one.
+    fn save(&self, picture: &Picture, out: &Output, subject: &Subject) -> Result<Option<PathBuf>, Failure> {
+        let UVec2 { x: width, y: height } = picture.size;
+        let comment = format!(
+            "{}; radiance in kcd/m2, linear Rec. 709; depth, position (from the eye: X east, Y north, Z up) and height in metres",
+            subject.name
+        );
+        let mut layers = Vec::new();
+        if out.kind == Kind::Exr {
+            let plane = |i: usize| picture.radiance.iter().map(|p| p[i]).collect();
+            layers.push(Layer { name: "", channels: vec![("R", plane(0)), ("G", plane(1)), ("B", plane(2))] });
+        } else {
+            let pixels = picture.display(&Display::default());
+            let notes = [("Software", "littoral".to_owned()), ("Source", subject.name.clone())];
+            write::png(&out.file, width, height, PngPixels::Rgb8(&pixels), &notes)?;
+        }
+        let three = |name, planes: &[[f32; 3]]| {
+            let plane = |i: usize| planes.iter().map(|p| p[i]).collect();
+            Layer { name, channels: vec![("X", plane(0)), ("Y", plane(1)), ("Z", plane(2))] }
+        };
+        let stretch = subject.exaggeration as f32;
+        for pass in &self.passes {
+            layers.push(match pass {
+                Pass::Depth => Layer { name: "depth", channels: vec![("V", picture.depth.clone())] },
+                Pass::Normal => three("normal", &picture.normal),
+                Pass::Position => three("position", &picture.position),
+                Pass::Height => {
+                    let heights = picture.height.iter().map(|h| h / stretch).collect();
+                    Layer { name: "height", channels: vec![("V", heights)] }
+                }
+            });
+        }
+        if layers.is_empty() {
+            return Ok(None);
+        }
+        let file = out.file.with_extension("exr");
+        write::exr(&file, width, height, layers, &comment)?;
+        Ok((file != out.file).then_some(file))
+    }
+}
+
+/// A shot and its vertical angle of view (rad).
+struct Framed {
+    shot: Shot,
+    field: f64,
+}
+
+impl std::ops::Deref for Framed {
+    type Target = Shot;
+
+    fn deref(&self) -> &Shot {
+        &self.shot
+    }
+}
+
+/// What is written.
+struct Output {
+    file: PathBuf,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Png,
+    Exr,
+    Film,
+    Frames,
+}
+
+impl Subject {
+    /// Local metres of typed coordinates.
+    pub fn local(&self, system: System, at: DVec2) -> Result<DVec2, Failure> {
+        self.frame.local(system, at).map_err(|e| Failure::Work(format!("{}: {e}", self.name)))
+    }
+
+    /// Height (m, stretched) of ground or water below a local position.
+    pub fn surface(&self, local: DVec2) -> Option<f64> {
+        let ground = height_at(&self.land, local).map(f64::from);
+        let water = self.water.as_ref().filter(|water| water.covers(local)).map(|water| water.level);
+        match (ground, water) {
+            (Some(ground), Some(water)) => Some(ground.max(water)),
+            (ground, water) => ground.or(water),
+        }
+    }
+
+    /// A local position in the file's coordinates, its height as unstretched.
+    pub fn given(&self, local: DVec3) -> DVec3 {
+        self.frame.crs(local.truncate()).extend(local.z / self.exaggeration)
+    }
+
+    /// `X,Y,Z` as it can be typed.
+    pub fn shown(&self, given: DVec3) -> String {
+        format!("{},{},{}", self.frame.shown(given.x), self.frame.shown(given.y), tidy(given.z, 1))
+    }
+}
+
+/// The climate where the land lies.
+fn climate(frame: &Frame) -> Climate {
+    match frame.latitude() {
+        Some(latitude) => Climate::at_latitude(latitude.to_radians()),
+        None => Climate::default(),
+    }
+}
+
+/// A picture to lay over the ground.
+fn drape(file: &Path, subject: &Subject, talk: &mut Talk) -> Result<Drape, Failure> {
+    let _ = (subject, talk, Texture::size, Vec2::ONE);
+    Err(Failure::Work(format!("{}: pictures to lay over the ground cannot be read yet", file.display())))
+}
+
+/// Complains about an output before any work is done: a missing folder, or one of the inputs.
+pub fn check_output(out: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+    if let Ok(there) = out.canonicalize()
+        && inputs.iter().any(|input| input.canonicalize().is_ok_and(|input| input == there))
+    {
+        let file = out.display();
+        return Err(Failure::Usage(format!(
+            "{file}: expected another name than an input's for the output; change --out"
+        )));
+    }
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if folder.is_dir() {
+        return Ok(());
+    }
+    Err(Failure::Work(format!(
+        "{}: expected the folder {} to exist, got nothing of that name; create it or choose another name",
+        out.display(),
+        folder.display()
+    )))
+}

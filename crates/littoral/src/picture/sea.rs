@@ -1,0 +1,208 @@
+//! Light on and in still water.
+//!
+//! The surface mirrors by Fresnel's law. Its ripples are noise as far as a pixel can show them and a distribution of slopes
+//! below that, which spreads the sun into glitter and blurs what is mirrored. Into the water, the semi-analytical
+//! reflectance of Z. Lee et al. gives what comes back from the water itself and from the bed, with the absorption of R. Pope
+//! and E. Fry, the scattering of R. Smith and K. Baker, and the dissolved matter and plankton of clear coastal water.
+//!
+//! Works this rests on: C. Cox, W. Munk, "Measurement of the roughness of the sea surface from photographs of the sun's
+//! glitter", 1954; R. Smith, K. Baker, Applied Optics 20, 1981; R. Pope, E. Fry, Applied Optics 36, 1997; Z. Lee et al.,
+//! "Hyperspectral remote sensing for shallow waters: 1", Applied Optics 37, 1998.
+
+use super::grain::{grain, patch, resolved};
+use super::spectrum::{SUNLIGHT, Spectrum};
+use glam::{DVec2, DVec3, Vec2, Vec3};
+
+/// Refractive index of sea water.
+pub const INDEX: f32 = 1.34;
+
+/// Absorption of pure water (1/m): Pope and Fry 1997.
+const PURE: [f32; 8] = [0.006_63, 0.006_35, 0.0127, 0.0409, 0.0619, 0.2224, 0.3108, 0.465];
+/// Scattering of sea water (1/m): Smith and Baker 1981; half goes back.
+const SCATTER: [f32; 8] = [0.0076, 0.0050, 0.0034, 0.0024, 0.0018, 0.0013, 0.0010, 0.0008];
+/// Absorption of phytoplankton relative to that at 440 nm.
+const PLANKTON: [f32; 8] = [0.70, 1.00, 0.72, 0.36, 0.15, 0.12, 0.14, 0.42];
+
+/// Length of the table, and the longest path in it (m).
+const STEPS: usize = 256;
+const LONGEST: f32 = 160.0;
+
+/// What the water does to light over a path down and up.
+pub struct Depths {
+    /// For each path: radiance from the water itself, per irradiance below the surface; share left of the bed's light.
+    table: Vec<(Vec3, Vec3)>,
+}
+
+impl Depths {
+    /// Clear coastal water.
+    pub fn new() -> Depths {
+        let mut absorb = Spectrum(PURE);
+        let mut back = Spectrum(SCATTER) * 0.5;
+        let dissolved = Spectrum::of(|nm| 0.030 * (-0.015 * (nm - 440.0)).exp());
+        let particles = Spectrum::of(|nm| 0.0022 * 550.0 / nm);
+        absorb += dissolved + Spectrum(PLANKTON) * 0.022;
+        back += particles;
+        let white = SUNLIGHT.rgb();
+        let table = (0..=STEPS)
+            .map(|i| {
+                let path = path_at(i as f32);
+                let own = Spectrum(std::array::from_fn(|b| {
+                    let extinction = absorb.0[b] + back.0[b];
+                    let u = back.0[b] / extinction;
+                    // Lee 1998, equations 9 and 12: what an endless depth sends back, less what this one lacks.
+                    (0.084 + 0.170 * u) * u * (1.0 - (-extinction * path).exp())
+                }));
+                let left = Spectrum(std::array::from_fn(|b| (-(absorb.0[b] + back.0[b]) * path).exp()));
+                ((own * SUNLIGHT).rgb().max(Vec3::ZERO) / white, (left * SUNLIGHT).rgb().max(Vec3::ZERO) / white)
+            })
+            .collect();
+        Depths { table }
+    }
+
+    /// Radiance leaving the surface (kcd/m²) for irradiance `below` (klx) just under it, over a bed of this depth (m) that
+    /// throws back `bed` of it. Cosines are those of sun and eye within the water.
+    pub fn radiance(&self, depth: f32, sun_cosine: f32, eye_cosine: f32, below: Vec3, bed: Vec3) -> Vec3 {
+        let path = depth.max(0.0) * (1.0 / sun_cosine + 1.05 / eye_cosine);
+        let at = step_of(path).min(STEPS as f32 - 1e-3);
+        let (i, f) = (at as usize, at.fract());
+        let own = self.table[i].0.lerp(self.table[i + 1].0, f);
+        let left = self.table[i].1.lerp(self.table[i + 1].1, f);
+        // Through the surface a beam widens by the index squared; a little is turned back within (Lee 1998, equation 8).
+        (own + left * bed / std::f32::consts::PI) * below * 0.54
+    }
+}
+
+fn path_at(step: f32) -> f32 {
+    LONGEST * (step / STEPS as f32).powi(2)
+}
+
+fn step_of(path: f32) -> f32 {
+    (path / LONGEST).sqrt() * STEPS as f32
+}
+
+/// Share of unpolarised light that water mirrors, for the cosine of incidence in air.
+pub fn fresnel(cosine: f32) -> f32 {
+    let c = cosine.clamp(0.0, 1.0);
+    let t = (1.0 - (1.0 - c * c) / (INDEX * INDEX)).max(0.0).sqrt();
+    let (s, p) = ((c - INDEX * t) / (c + INDEX * t), (INDEX * c - t) / (INDEX * c + t));
+    0.5 * (s * s + p * p)
+}
+
+/// Direction of a ray within the water, for a unit direction that meets a surface of unit normal from above.
+pub fn refract(direction: Vec3, normal: Vec3) -> Vec3 {
+    let cosine = -direction.dot(normal);
+    let k = 1.0 - (1.0 - cosine * cosine) / (INDEX * INDEX);
+    direction / INDEX + normal * (cosine / INDEX - k.max(0.0).sqrt())
+}
+
+/// Ripples at a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Ripples {
+    /// Slope of those a pixel can show.
+    pub slope: Vec2,
+    /// Variance, in each direction, of the slopes of those it cannot.
+    pub variance: f32,
+}
+
+/// The ripples of a light air at a world position (m), for a pixel of this footprint (m).
+pub fn ripples(at: DVec2, footprint: f32) -> Ripples {
+    // Gusts and lanes: the same breeze does not touch all of the water.
+    let plane = at.extend(0.0);
+    let along = DVec3::new(plane.x * 0.8 + plane.y * 0.6, (plane.y * 0.8 - plane.x * 0.6) * 2.6, 0.0);
+    let lanes = patch(along, 700.0, footprint, 40) + 0.7 * patch(along, 190.0, footprint, 41) + 0.4 * patch(along, 47.0, footprint, 44);
+    let strength = (0.85 + 1.1 * lanes).clamp(0.25, 1.8);
+    let mut slope = Vec2::ZERO;
+    let mut variance = 4.0e-4;
+    let mut wavelength = 17.0f32;
+    for octave in 0..9u32 {
+        // Mean square slope of one octave of unit amplitude is about 0.5 in each direction of the noise.
+        let amplitude = 0.020 * strength * if octave < 2 { 0.45 } else { 1.0 };
+        let share = resolved(wavelength, footprint);
+        if share > 0.0 {
+            // Each octave turned a little, and longer along its crests.
+            let (s, c) = (0.35 + 0.9 * f64::from(octave)).sin_cos();
+            let turned = DVec3::new(at.x * c + at.y * s, (at.y * c - at.x * s) * 0.55, 0.0) / f64::from(wavelength);
+            let g = grain(turned + DVec3::Z * 0.37, 50 + octave).gradient;
+            let (s, c) = (s as f32, c as f32);
+            let g = Vec2::new(g.x, 0.55 * g.y);
+            slope += Vec2::new(g.x * c - g.y * s, g.x * s + g.y * c) * (amplitude * share);
+        }
+        variance += 0.45 * (amplitude * amplitude) * (1.0 - share * share);
+        wavelength *= 0.53;
+    }
+    Ripples { slope, variance }
+}
+
+/// Radiance of the sun's glitter per unit of sunlight on a facing surface (1/sr): Cox and Munk. All vectors unit, `eye` and `sun`
+/// pointing away from the water.
+pub fn glitter(eye: Vec3, sun: Vec3, ripples: &Ripples) -> f32 {
+    let half = (eye + sun).normalize_or(Vec3::Z);
+    if half.z < 0.05 {
+        return 0.0;
+    }
+    let slope = Vec2::new(-half.x, -half.y) / half.z - ripples.slope;
+    let density = (-0.5 * slope.length_squared() / ripples.variance).exp() / (2.0 * std::f32::consts::PI * ripples.variance);
+    fresnel(eye.dot(half)) * density / (4.0 * eye.z.max(0.03) * half.z.powi(4))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fresnel_has_its_known_values() {
+        let upright = ((INDEX - 1.0) / (INDEX + 1.0)).powi(2);
+        assert!((fresnel(1.0) - upright).abs() < 1e-6);
+        assert!((fresnel(0.0) - 1.0).abs() < 1e-6);
+        // At Brewster's angle half of the s-polarised light is all that returns.
+        let brewster = (1.0f32 / (1.0 + INDEX * INDEX)).sqrt();
+        let s = ((INDEX * INDEX - 1.0) / (INDEX * INDEX + 1.0)).powi(2);
+        assert!((fresnel(brewster) - 0.5 * s).abs() < 1e-5);
+    }
+
+    #[test]
+    fn refraction_follows_snell() {
+        let direction = Vec3::new(0.6, 0.0, -0.8);
+        let within = refract(direction, Vec3::Z);
+        assert!((within.length() - 1.0).abs() < 1e-6);
+        assert!((within.x * INDEX - 0.6).abs() < 1e-6 && within.z < 0.0);
+    }
+
+    #[test]
+    fn shallow_water_shows_its_bed_and_deep_water_is_blue() {
+        let depths = Depths::new();
+        let seen = |depth| depths.radiance(depth, 0.9, 0.9, Vec3::ONE, Vec3::splat(0.4));
+        assert!((seen(0.0) - Vec3::splat(0.54 * 0.4 / std::f32::consts::PI)).abs().max_element() < 1e-4);
+        let (three, deep) = (seen(3.0), seen(200.0));
+        assert!(three.y > three.x * 2.0 && three.y > 0.7 * three.z, "turquoise: {three}");
+        assert!(deep.z > deep.y && deep.y > 3.0 * deep.x, "blue: {deep}");
+        // Irradiance reflectance of clear coastal water: one to four per cent.
+        assert!((0.004..0.04).contains(&(deep.z * std::f32::consts::PI)), "{deep}");
+        let mut last = seen(0.0).element_sum();
+        for depth in 1..60 {
+            let here = seen(depth as f32).element_sum();
+            assert!(here <= last);
+            last = here;
+        }
+    }
+
+    #[test]
+    fn glitter_sends_back_what_fresnel_mirrors() {
+        // Smooth water, sun and eye high: ∫ L cosθ dω over all eyes = Fresnel's share of the sunlight, at its incidence.
+        let sun = Vec3::new(0.3, 0.0, (1.0f32 - 0.09).sqrt());
+        let calm = Ripples { slope: Vec2::ZERO, variance: 0.002 };
+        let (n, mut sum) = (900, 0.0);
+        for i in 0..n {
+            for j in 0..n {
+                let (x, y) = ((i as f32 + 0.5) / n as f32 * 2.0 - 1.0, (j as f32 + 0.5) / n as f32 * 2.0 - 1.0);
+                let square = 1.0 - x * x - y * y;
+                if square > 0.01 {
+                    // dω cosθ = dx dy.
+                    sum += glitter(Vec3::new(x, y, square.sqrt()), sun, &calm) * 4.0 / (n * n) as f32;
+                }
+            }
+        }
+        let expected = fresnel(sun.z) * sun.z;
+        assert!((sum / expected - 1.0).abs() < 0.03, "{sum} for {expected}");
+    }
+}

@@ -1,0 +1,407 @@
+//! From what a ray meets to the light it brings.
+
+use super::atmosphere::Veil;
+use super::cartography::relief;
+use super::grain::step;
+use super::ground::Surface;
+use super::natural::{Material, natural};
+use super::sampler::Sampler;
+use super::sea::{Ripples, fresnel, glitter, refract, ripples};
+use super::skylight::irradiance;
+use super::stage::{HIGHEST_EYE, Lens, Stage, purpose};
+use super::Style;
+use crate::raycast::LocalRay;
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use std::f32::consts::PI;
+
+/// What lies ahead on a ray.
+pub enum Ahead {
+    /// Nothing.
+    Sky,
+    /// Mist beyond the land.
+    Mist {
+        /// Where (m).
+        position: DVec3,
+    },
+    /// The water's surface.
+    Water {
+        /// Where (m).
+        position: DVec3,
+    },
+    /// The ground.
+    Ground {
+        /// Where (m).
+        position: DVec3,
+    },
+}
+
+/// The light of one ray, but for what shadow and mirror rays will find.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shaded {
+    /// Light that needs no further ray (kcd/m²).
+    pub light: Vec3,
+    /// Light of the sun, if `shadow` meets nothing.
+    pub sunlit: Vec3,
+    /// Towards the sun.
+    pub shadow: Option<LocalRay>,
+    /// What is seen in the water, and how much of it comes back.
+    pub mirror: Option<LocalRay>,
+    /// Share of the mirrored light that comes back.
+    pub mirror_share: f32,
+    /// Added by the air on the way to the eye.
+    pub veil: Vec3,
+    /// Let through by it.
+    pub through: Vec3,
+    /// Whether nothing but sky is seen.
+    pub sky: bool,
+}
+
+/// What the samples of one pixel share. What lies there is looked up for some of them and lent to those that land close by: all of it is
+/// already averaged over the pixel's footprint, while edges, shadows and mirrors keep every sample.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Near {
+    ground: Option<(f32, u32, Facet)>,
+    water: Option<(f32, u32, Pool)>,
+    veil: Option<(f32, Veil)>,
+}
+
+/// Samples that share one look-up.
+const SHARED: u32 = 4;
+
+/// A piece of ground, lit by the sky.
+#[derive(Clone, Copy, Debug)]
+struct Facet {
+    smooth: Vec3,
+    /// Light of the sky that it throws back (kcd/m²).
+    skylit: Vec3,
+    /// Light of the unshaded sun that it throws back.
+    sunlit: Vec3,
+}
+
+/// A piece of water.
+#[derive(Clone, Copy, Debug)]
+struct Pool {
+    ripples: Ripples,
+    depth: f32,
+    /// How much of it is water at all, and not unknown.
+    open: f32,
+    /// Light of the sky and of the unshaded sun that comes up through the surface, but for what that keeps.
+    skylit: Vec3,
+    sunlit: Vec3,
+}
+
+impl Stage<'_> {
+    /// The light that comes from `ahead` along `direction` (unit, away from the eye).
+    pub(super) fn shade(
+        &self,
+        lens: &Lens,
+        direction: Vec3,
+        ahead: &Ahead,
+        sampler: Sampler,
+        index: u32,
+        near: &mut Near,
+    ) -> Shaded {
+        if self.scene.style == Style::Relief {
+            return self.painted(lens, direction, ahead);
+        }
+        let position = match *ahead {
+            Ahead::Sky => {
+                let light = lens.sky.radiance(direction) + lens.sky.sun_disc(direction);
+                return Shaded { light, through: Vec3::ONE, sky: true, ..Shaded::default() };
+            }
+            Ahead::Mist { position } | Ahead::Water { position } | Ahead::Ground { position } => position,
+        };
+        let distance = (position - lens.eye).length() as f32;
+        let mut shaded = match ahead {
+            Ahead::Water { .. } => self.water(lens, direction, position, distance, sampler, index, near),
+            Ahead::Ground { .. } => self.ground(lens, direction, position, distance, sampler, index, near),
+            _ => Shaded { light: self.mist, ..Shaded::default() },
+        };
+        shaded.through = Vec3::ONE;
+        if self.scene.air.veils_distance {
+            let veil = match near.veil {
+                Some((at, veil)) if close(at, distance, 0.004) => veil,
+                _ => {
+                    let mut through = distance;
+                    if lens.eye.z > HIGHEST_EYE {
+                        through = through.min((HIGHEST_EYE - position.z) as f32 / (-direction.z).max(1e-3));
+                    }
+                    let veil = lens.sky.veil(direction, through);
+                    near.veil = Some((distance, veil));
+                    veil
+                }
+            };
+            (shaded.veil, shaded.through) = (veil.light, veil.through);
+        }
+        shaded
+    }
+
+    /// A cartographer's paper: no sun, no air, only tones.
+    fn painted(&self, lens: &Lens, direction: Vec3, ahead: &Ahead) -> Shaded {
+        let paper = Vec3::new(0.90, 0.89, 0.86);
+        let light = match *ahead {
+            Ahead::Ground { position } => {
+                let at = position.truncate();
+                let footprint = self.footprint(lens, (position - lens.eye).length() as f32, -direction.z);
+                let wet = self.scene.water.is_some_and(|w| w.covers(at));
+                let to_sun = self.sun.truncate().normalize_or(Vec2::new(-0.7, 0.7));
+                let ground = relief(&self.ground, &self.tints, at, position.z as f32, footprint, to_sun, wet);
+                paper.lerp(ground, self.ground.known(at))
+            }
+            _ => paper,
+        };
+        Shaded { light, through: Vec3::ONE, sky: matches!(ahead, Ahead::Sky), ..Shaded::default() }
+    }
+
+    /// Width of a pixel at a distance on something whose normal makes this cosine with the eye (m). Slanted pixels are long; the samples
+    /// within them see to that in part.
+    fn footprint(&self, lens: &Lens, distance: f32, cosine: f32) -> f32 {
+        (distance * lens.pixel * (1.0 / cosine.max(0.02)).sqrt() * 0.8).max(1e-4)
+    }
+
+    /// A direction to a random point of the sun's disc.
+    fn to_sun(&self, sampler: Sampler, index: u32) -> Vec3 {
+        let across = self.sun.any_orthonormal_vector();
+        let disc = sampler.disc(index, purpose::SUN) * self.scene.sun.angular_radius as f32;
+        (self.sun + across * disc.x + self.sun.cross(across) * disc.y).normalize()
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
+    fn ground(
+        &self,
+        lens: &Lens,
+        direction: Vec3,
+        position: DVec3,
+        distance: f32,
+        sampler: Sampler,
+        index: u32,
+        near: &mut Near,
+    ) -> Shaded {
+        let known = self.ground.known(position.truncate());
+        if known == 0.0 {
+            return Shaded { light: self.mist, ..Shaded::default() };
+        }
+        // The lines of a map are finer than a footprint: every sample looks for itself.
+        let shared = if self.is_map() { 1 } else { SHARED };
+        let facet = match near.ground {
+            Some((at, uses, facet)) if uses < shared && close(at, distance, 0.02) => {
+                near.ground = Some((at, uses + 1, facet));
+                facet
+            }
+            _ => {
+                let facet = self.facet(lens, direction, position, distance);
+                near.ground = Some((distance, 1, facet));
+                facet
+            }
+        };
+        let mut shaded = Shaded { light: facet.skylit, ..Shaded::default() };
+        if facet.sunlit != Vec3::ZERO {
+            let lift = 0.02 * self.ground.spacing() + 1.5e-4 * distance;
+            shaded.sunlit = facet.sunlit;
+            let origin = (position - lens.eye).as_vec3() + facet.smooth * lift;
+            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
+        }
+        if known < 1.0 {
+            shaded.light = self.mist.lerp(shaded.light, known);
+            shaded.sunlit *= known;
+        }
+        shaded
+    }
+
+    /// The ground at a place, as a pixel sees it.
+    fn facet(&self, lens: &Lens, direction: Vec3, position: DVec3, distance: f32) -> Facet {
+        let at = position.truncate();
+        let rough = self.ground.surface(at, distance * lens.pixel);
+        let normal_of = |s: &Surface| Vec3::new(-s.slope.x, -s.slope.y, 1.0).normalize();
+        let footprint = self.footprint(lens, distance, -direction.dot(normal_of(&rough)));
+        let surface = self.ground.surface(at, footprint);
+        let smooth = normal_of(&surface);
+        let material = self.material(position, &surface, footprint);
+        let sky = irradiance(&self.skylight.at(at), material.normal) * material.openness;
+        let mut skylit = material.albedo / PI * sky;
+        if material.wet > 0.0 {
+            let mirrored = direction - 2.0 * direction.dot(smooth) * smooth;
+            let share = fresnel(-direction.dot(smooth)) * material.wet * 0.6;
+            skylit += share * self.sky.radiance(Vec3::new(mirrored.x, mirrored.y, mirrored.z.max(0.02)).normalize());
+        }
+        // Slopes that turn from the sun hide their own relief from it.
+        let facing = material.normal.dot(self.sun).max(0.0) * step(-0.02, 0.12, smooth.dot(self.sun));
+        let sunlit = match facing > 0.0 {
+            true => material.albedo / PI * self.air.sunlight(position.z as f32) * (facing * (0.4 + 0.6 * material.openness)),
+            false => Vec3::ZERO,
+        };
+        Facet { smooth, skylit, sunlit }
+    }
+
+    fn material(&self, position: DVec3, surface: &Surface, footprint: f32) -> Material {
+        let at = position.truncate();
+        let spacing = self.ground.spacing();
+        let even = |albedo: Vec3| {
+            let normal = normal_of_slope(surface.slope);
+            let openness = (1.0 - 0.6 * surface.hollow * spacing.max(footprint)).clamp(0.75, 1.0);
+            Material { albedo, normal, openness, wet: 0.0 }
+        };
+        if self.scene.style == Style::Tint {
+            let wet = self.scene.water.is_some_and(|w| w.covers(at));
+            return even(self.tints.colour(position.z as f32, wet));
+        }
+        if let (Style::Image, Some(drape)) = (self.scene.style, self.scene.drape) {
+            let span = f64::from(footprint);
+            return match drape.colour(at, DVec2::X * span, DVec2::Y * span) {
+                // Cameras' pictures hold light, not albedo: what is white in them reflects about 0.6.
+                Some(colour) => even(colour * 0.6),
+                None => even(Vec3::splat(0.25)),
+            };
+        }
+        let water = self.scene.water.filter(|w| w.covers(at) || position.z < w.level + 15.0);
+        let level = water.map(|w| w.level as f32);
+        let broad = self.ground.surface(at, (4.0 * spacing).max(footprint));
+        natural(position, surface, &broad, spacing, footprint, level, &self.scene.climate, self.ground.standing(at))
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
+    fn water(
+        &self,
+        lens: &Lens,
+        direction: Vec3,
+        position: DVec3,
+        distance: f32,
+        sampler: Sampler,
+        index: u32,
+        near: &mut Near,
+    ) -> Shaded {
+        let eye = -direction;
+        let pool = match near.water {
+            Some((at, uses, pool)) if uses < SHARED && close(at, distance, 0.02) => {
+                near.water = Some((at, uses + 1, pool));
+                pool
+            }
+            _ => {
+                let pool = self.pool(lens, direction, position, distance);
+                near.water = Some((distance, 1, pool));
+                pool
+            }
+        };
+        let slope = pool.ripples.slope + pool.ripples.variance.sqrt() * sampler.normal(index, purpose::RIPPLE);
+        let facet = normal_of_slope(slope);
+        let facet = if facet.dot(eye) > 0.02 { facet } else { Vec3::Z };
+        let share = fresnel(facet.dot(eye));
+        let mut mirrored = 2.0 * facet.dot(eye) * facet - eye;
+        // A ray thrown down into the next ripple comes up again, a little higher.
+        mirrored.z = if mirrored.z < 0.0 { 0.02 - 0.5 * mirrored.z } else { mirrored.z.max(0.004) };
+        let origin = (position - lens.eye).as_vec3() + Vec3::Z * (0.02 + 1e-6 * distance);
+        // The last film of water mirrors no more than wet sand.
+        let film = step(0.0, 0.05, pool.depth);
+        let leaves = (1.0 - share) / 0.98;
+        let mut shaded = Shaded {
+            light: pool.skylit * leaves,
+            mirror: Some(LocalRay::new(origin, mirrored.normalize())),
+            mirror_share: share * (0.5 + 0.5 * film),
+            ..Shaded::default()
+        };
+        if self.sun.z > 0.0 {
+            shaded.sunlit = pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &pool.ripples) * film);
+            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
+        }
+        if pool.open < 1.0 {
+            shaded.light = self.mist.lerp(shaded.light, pool.open);
+            shaded.sunlit *= pool.open;
+            shaded.mirror_share *= pool.open;
+        }
+        shaded
+    }
+
+    /// How much of what lies at a place beyond the raster is sea, in [0, 1]: as much as of the border next to it.
+    fn open_sea(&self, at: DVec2) -> f32 {
+        let (low, high) = (self.scene.land.origin(), self.scene.land.origin() + self.scene.land.extent());
+        let border = at.clamp(low, high);
+        let away = (at - border).length();
+        let Some(water) = self.scene.water.filter(|_| away > 0.0) else { return 1.0 };
+        // The further out, the wider the stretch of border that counts; as far as the land is wide, all of it.
+        let along = (at - border).perp().normalize_or(DVec2::X);
+        let span = 0.25 * away + 2.0 * f64::from(self.ground.spacing());
+        let wet = (-4..=4).filter(|k| {
+            let place = (border + along * (f64::from(*k) * 0.25 * span)).clamp(low, high);
+            let ground = self.scene.land.height_at(place);
+            water.covers(place) && ground.is_some_and(|h| f64::from(h) <= water.level)
+        });
+        step(0.15, 0.85, wet.count() as f32 / 9.0)
+    }
+
+    /// The water at a place, as a pixel sees it.
+    fn pool(&self, lens: &Lens, direction: Vec3, position: DVec3, distance: f32) -> Pool {
+        let at = position.truncate();
+        let eye = -direction;
+        let footprint = self.footprint(lens, distance, eye.z);
+        let ripples = ripples(at, footprint);
+        let shown = normal_of_slope(ripples.slope);
+        // Into the water, to where the bent ray meets the bed.
+        let within = if shown.dot(eye) > 0.02 { refract(direction, shown) } else { refract(direction, Vec3::Z) };
+        let down = (-within.z).max(0.3);
+        let aside = within.truncate() / down;
+        let mut below = at;
+        let mut depth = self.depth(at);
+        for _ in 0..3 {
+            below = at + aside.as_dvec2() * f64::from(depth.min(60.0));
+            depth = 0.5 * (depth + self.depth(below));
+        }
+        let sun_within = -refract(-self.sun, Vec3::Z);
+        let bed = if depth < 45.0 {
+            let surface = self.ground.surface(below, footprint);
+            let material = self.material(below.extend(position.z - f64::from(depth)), &surface, footprint);
+            let facing = (material.normal.dot(sun_within) / sun_within.z.max(0.2)).clamp(0.3, 1.5);
+            Vec3::splat(0.1).lerp(material.albedo * facing, self.ground.known(below))
+        } else {
+            Vec3::splat(0.1)
+        };
+        let up = |irradiance: Vec3| self.depths.radiance(depth, sun_within.z.max(0.5), down, irradiance, bed);
+        let sun = self.sun.z.max(0.0);
+        Pool {
+            ripples,
+            depth,
+            open: self.open_sea(at),
+            skylit: up(irradiance(&self.skylight.open, Vec3::Z) * 0.93),
+            sunlit: up(self.air.sunlight(0.0) * (sun * (1.0 - fresnel(sun)))),
+        }
+    }
+
+    /// Depth of the water at a world position (m). Beyond the raster the bed sinks on.
+    fn depth(&self, at: DVec2) -> f32 {
+        let Some(water) = self.scene.water else { return 0.0 };
+        let land = &self.ground.land;
+        let inside = at.clamp(land.origin(), land.origin() + land.extent());
+        let bed = land.height_at(inside).unwrap_or(f32::NEG_INFINITY);
+        let beyond = (at - inside).length() as f32;
+        (water.level as f32 - bed + 0.03 * beyond).clamp(0.0, 1e4)
+    }
+
+    /// What water mirrors along a ray that meets the ground at `distance` (m): sky, or the land as it looks from afar.
+    pub(super) fn mirrored(&self, lens: &Lens, ray: &LocalRay, distance: f32) -> Vec3 {
+        if distance == f32::INFINITY {
+            return self.sky.radiance(ray.direction);
+        }
+        let position = lens.eye + (ray.origin + ray.direction * distance).as_dvec3();
+        let at = position.truncate();
+        let known = self.ground.known(at);
+        let spacing = self.ground.spacing();
+        let surface = self.ground.surface(at, 2.0 * spacing);
+        let material = self.material(position, &surface, 2.0 * spacing);
+        let sun = self.air.sunlight(position.z as f32) * (material.normal.dot(self.sun).max(0.0) * self.skylight.sunny(at));
+        let sky = irradiance(&self.skylight.at(at), material.normal) * material.openness;
+        let light = self.mist.lerp(material.albedo / PI * (sun + sky), known);
+        if !self.scene.air.veils_distance {
+            return light;
+        }
+        let veil = self.sky.veil(ray.direction, distance);
+        light * veil.through + veil.light
+    }
+}
+
+fn normal_of_slope(slope: Vec2) -> Vec3 {
+    Vec3::new(-slope.x, -slope.y, 1.0).normalize()
+}
+
+/// Whether two distances differ by no more than a share of the first.
+fn close(a: f32, b: f32, share: f32) -> bool {
+    (a - b).abs() <= share * a
+}

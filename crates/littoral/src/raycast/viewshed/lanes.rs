@@ -1,0 +1,341 @@
+//! Sixteen numbers at once: AVX-512, AVX2 or plain arrays, equal to the bit.
+//!
+//! Only operations that IEEE 754 defines exactly are used, and never a fused multiply–add, so that every form gives the
+//! same numbers. What plain loops would not give is [`Lanes::lookup`], a table of sixteen entries held in registers.
+
+/// Sixteen `f32` at once.
+pub(super) trait Lanes: Copy {
+    /// Sixteen indices into a table of sixteen.
+    type Index: Copy;
+
+    fn splat(value: f32) -> Self;
+    /// # Safety
+    /// Sixteen numbers must be readable at `from`, and the processor must have the instructions of this form.
+    unsafe fn load(from: *const f32) -> Self;
+    /// # Safety
+    /// Sixteen numbers must be writable at `to`, and the processor must have the instructions of this form.
+    unsafe fn store(self, to: *mut f32);
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    /// The greater; `other` where they compare neither way.
+    fn max(self, other: Self) -> Self;
+    /// The smaller; `other` where they compare neither way.
+    fn min(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// Whole part as an index and as a number; for values in [0, 16).
+    fn whole(self) -> (Self::Index, Self);
+    /// Entry `index` of this table, lane by lane.
+    fn lookup(self, index: Self::Index) -> Self;
+    /// Where this is at most `other`, lowest lane in the lowest bit.
+    fn at_most(self, other: Self) -> u16;
+    /// `self` where the mask has a one, else `other`.
+    fn select(self, mask: u16, other: Self) -> Self;
+    /// The smallest lane.
+    fn smallest(self) -> f32;
+    /// The greatest lane.
+    fn greatest(self) -> f32;
+}
+
+/// Plain arrays, for every processor.
+#[derive(Clone, Copy)]
+pub(super) struct Portable([f32; 16]);
+
+impl Portable {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let mut result = self;
+        for lane in 0..16 {
+            result.0[lane] = f(self.0[lane], other.0[lane]);
+        }
+        result
+    }
+}
+
+impl Lanes for Portable {
+    type Index = [u32; 16];
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Portable([value; 16])
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: the caller vouches for sixteen numbers; reads may be unaligned.
+        Portable(unsafe { from.cast::<[f32; 16]>().read_unaligned() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: the caller vouches for room for sixteen numbers; writes may be unaligned.
+        unsafe { to.cast::<[f32; 16]>().write_unaligned(self.0) }
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.zip(self, |a, _| a.abs())
+    }
+    #[inline(always)]
+    fn whole(self) -> (Self::Index, Self) {
+        let mut index = [0; 16];
+        let mut whole = self;
+        for lane in 0..16 {
+            index[lane] = self.0[lane] as i32 as u32;
+            whole.0[lane] = index[lane] as i32 as f32;
+        }
+        (index, whole)
+    }
+    #[inline(always)]
+    fn lookup(self, index: Self::Index) -> Self {
+        let mut result = self;
+        for lane in 0..16 {
+            result.0[lane] = self.0[(index[lane] & 15) as usize];
+        }
+        result
+    }
+    #[inline(always)]
+    fn at_most(self, other: Self) -> u16 {
+        let mut mask = 0;
+        for lane in 0..16 {
+            mask |= u16::from(self.0[lane] <= other.0[lane]) << lane;
+        }
+        mask
+    }
+    #[inline(always)]
+    fn select(self, mask: u16, other: Self) -> Self {
+        let mut result = other;
+        for lane in 0..16 {
+            if mask >> lane & 1 == 1 {
+                result.0[lane] = self.0[lane];
+            }
+        }
+        result
+    }
+    #[inline(always)]
+    fn smallest(self) -> f32 {
+        self.0.into_iter().fold(f32::INFINITY, f32::min)
+    }
+    #[inline(always)]
+    fn greatest(self) -> f32 {
+        self.0.into_iter().fold(f32::NEG_INFINITY, f32::max)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(super) use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::Lanes;
+    use std::arch::x86_64::*;
+
+    /// One register of AVX-512. Values exist only where the instructions do: see [`Lanes::load`] and the dispatch.
+    #[derive(Clone, Copy)]
+    pub struct Avx512(__m512);
+
+    /// Two registers of AVX2.
+    #[derive(Clone, Copy)]
+    pub struct Avx2(__m256, __m256);
+
+    // SAFETY of all that follows: these methods are called only from functions compiled for the instruction set, which
+    // are entered only after the processor was asked for it.
+    #[allow(clippy::undocumented_unsafe_blocks)]
+    impl Lanes for Avx512 {
+        type Index = __m512i;
+
+        #[inline(always)]
+        fn splat(value: f32) -> Self {
+            Avx512(unsafe { _mm512_set1_ps(value) })
+        }
+        #[inline(always)]
+        unsafe fn load(from: *const f32) -> Self {
+            Avx512(unsafe { _mm512_loadu_ps(from) })
+        }
+        #[inline(always)]
+        unsafe fn store(self, to: *mut f32) {
+            unsafe { _mm512_storeu_ps(to, self.0) }
+        }
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            Avx512(unsafe { _mm512_add_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            Avx512(unsafe { _mm512_sub_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn mul(self, other: Self) -> Self {
+            Avx512(unsafe { _mm512_mul_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            Avx512(unsafe { _mm512_div_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            Avx512(unsafe { _mm512_max_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            Avx512(unsafe { _mm512_min_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            Avx512(unsafe { _mm512_abs_ps(self.0) })
+        }
+        #[inline(always)]
+        fn whole(self) -> (Self::Index, Self) {
+            unsafe {
+                let index = _mm512_cvttps_epi32(self.0);
+                (index, Avx512(_mm512_cvtepi32_ps(index)))
+            }
+        }
+        #[inline(always)]
+        fn lookup(self, index: Self::Index) -> Self {
+            Avx512(unsafe { _mm512_permutexvar_ps(index, self.0) })
+        }
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u16 {
+            unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0) }
+        }
+        #[inline(always)]
+        fn select(self, mask: u16, other: Self) -> Self {
+            Avx512(unsafe { _mm512_mask_blend_ps(mask, other.0, self.0) })
+        }
+        #[inline(always)]
+        fn smallest(self) -> f32 {
+            unsafe { _mm512_reduce_min_ps(self.0) }
+        }
+        #[inline(always)]
+        fn greatest(self) -> f32 {
+            unsafe { _mm512_reduce_max_ps(self.0) }
+        }
+    }
+
+    #[allow(clippy::undocumented_unsafe_blocks)]
+    impl Lanes for Avx2 {
+        type Index = (__m256i, __m256i);
+
+        #[inline(always)]
+        fn splat(value: f32) -> Self {
+            let half = unsafe { _mm256_set1_ps(value) };
+            Avx2(half, half)
+        }
+        #[inline(always)]
+        unsafe fn load(from: *const f32) -> Self {
+            unsafe { Avx2(_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8))) }
+        }
+        #[inline(always)]
+        unsafe fn store(self, to: *mut f32) {
+            unsafe {
+                _mm256_storeu_ps(to, self.0);
+                _mm256_storeu_ps(to.add(8), self.1);
+            }
+        }
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            unsafe { Avx2(_mm256_add_ps(self.0, other.0), _mm256_add_ps(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            unsafe { Avx2(_mm256_sub_ps(self.0, other.0), _mm256_sub_ps(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn mul(self, other: Self) -> Self {
+            unsafe { Avx2(_mm256_mul_ps(self.0, other.0), _mm256_mul_ps(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            unsafe { Avx2(_mm256_div_ps(self.0, other.0), _mm256_div_ps(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            unsafe { Avx2(_mm256_max_ps(self.0, other.0), _mm256_max_ps(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            unsafe { Avx2(_mm256_min_ps(self.0, other.0), _mm256_min_ps(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            unsafe {
+                let sign = _mm256_set1_ps(-0.0);
+                Avx2(_mm256_andnot_ps(sign, self.0), _mm256_andnot_ps(sign, self.1))
+            }
+        }
+        #[inline(always)]
+        fn whole(self) -> (Self::Index, Self) {
+            unsafe {
+                let (a, b) = (_mm256_cvttps_epi32(self.0), _mm256_cvttps_epi32(self.1));
+                ((a, b), Avx2(_mm256_cvtepi32_ps(a), _mm256_cvtepi32_ps(b)))
+            }
+        }
+        #[inline(always)]
+        fn lookup(self, index: Self::Index) -> Self {
+            unsafe {
+                // Bit 3 of an index, moved to the sign, picks the half of the table.
+                let half = |index: __m256i| {
+                    let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index));
+                    let (low, high) =
+                        (_mm256_permutevar8x32_ps(self.0, index), _mm256_permutevar8x32_ps(self.1, index));
+                    _mm256_blendv_ps(low, high, upper)
+                };
+                Avx2(half(index.0), half(index.1))
+            }
+        }
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u16 {
+            unsafe {
+                let a = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0));
+                let b = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.1, other.1));
+                (a | b << 8) as u16
+            }
+        }
+        #[inline(always)]
+        fn select(self, mask: u16, other: Self) -> Self {
+            unsafe {
+                let half = |bits: u16, yes: __m256, no: __m256| {
+                    let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                    let set = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(i32::from(bits)), bit), bit);
+                    _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(set))
+                };
+                Avx2(half(mask & 255, self.0, other.0), half(mask >> 8, self.1, other.1))
+            }
+        }
+        #[inline(always)]
+        fn smallest(self) -> f32 {
+            let mut lanes = [0.0; 8];
+            unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), _mm256_min_ps(self.0, self.1)) };
+            lanes.into_iter().fold(f32::INFINITY, f32::min)
+        }
+        #[inline(always)]
+        fn greatest(self) -> f32 {
+            let mut lanes = [0.0; 8];
+            unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), _mm256_max_ps(self.0, self.1)) };
+            lanes.into_iter().fold(f32::NEG_INFINITY, f32::max)
+        }
+    }
+}
