@@ -17,14 +17,14 @@ mod crs;
 mod error;
 pub mod formats;
 mod georeference;
-pub mod path;
 mod image;
+pub mod path;
 mod reduce;
 mod source;
 mod survey;
 pub mod voids;
-pub mod write;
 mod wkt;
+pub mod write;
 
 pub use crate::image::{BEHIND, Image, image_from, open_image};
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};

@@ -1,7 +1,7 @@
 //! Files that are broken, hostile or empty: each gives an error that says why, or a partial read with a warning; soon, and in
 //! memory that the file justifies. The collection is not part of the project: without `../shared/data` this passes and says so.
 
-use littoral_data::{open, survey};
+use littoral_data::{LoadOptions, load, open, survey};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -156,5 +156,13 @@ fn every_bad_file_is_told_apart() {
         most_seconds.0 * 1e3,
         most_seconds.1
     );
+    // Where nothing is valid there is nothing to show.
+    let options = LoadOptions { most_samples: 1 << 20 };
+    match load(&folder.join("bad/f32_all_nodata.tif"), options) {
+        Err(error) if error.to_string().contains("valid height") => {}
+        other => {
+            failures.push(format!("f32_all_nodata.tif: expected an error of no valid height, got {:?}", other.err()))
+        }
+    }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
