@@ -199,9 +199,14 @@ impl Frame {
         DVec2::new(columns as f64 - 1.0, rows as f64 - 1.0)
     }
 
-    /// Where everything lies.
-    pub fn georeference(&self) -> &Georeference {
-        &self.georeference
+    /// The coordinate system.
+    pub fn system(&self) -> Crs {
+        self.georeference.crs.clone()
+    }
+
+    /// Longitude and latitude (degrees) of coordinates.
+    pub fn lonlat(&self, crs: DVec2) -> Result<DVec2, String> {
+        self.georeference.lonlat_from_crs(crs)
     }
 
     /// Distance between samples (m).

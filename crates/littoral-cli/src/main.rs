@@ -32,8 +32,9 @@ use talk::{Failure, Talk};
   littoral info dem.tif            what a file is, and what is assumed about it
   littoral COMMAND --help          all options of a command, with examples
 
-Coordinates are those of the file's own coordinate system (--lonlat: degrees); heights are metres, angles degrees,
-bearings clockwise from north. Results go to stdout, everything else to stderr."
+Coordinates are those of the file's own coordinate system (--lonlat: degrees); heights are
+metres, angles degrees, bearings clockwise from north. Results go to stdout, everything else
+to stderr. Exit codes: 0 done, 1 the input or the work failed, 2 the command line was wrong."
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -54,19 +55,12 @@ struct General {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Make a picture, or with --path a film
     Render(Box<render::Render>),
-    /// Say what a file is: format, size, heights, coordinates, and what is assumed
     Info(info::Info),
-    /// Exact heights at points
     Height(height::Height),
-    /// Heights along a line, as CSV or a plot
     Profile(profile::Profile),
-    /// Line of sight between two points
     Sight(sight::Sight),
-    /// What can be seen from a point, as a GeoTIFF
     Viewshed(viewshed::Viewshed),
-    /// Measure the speed of this machine and this version
     Bench(bench::Bench),
 }
 
@@ -79,6 +73,11 @@ fn main() -> ExitCode {
             return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
         }
     };
+    std::panic::set_hook(Box::new(|panic| {
+        littoral_data::write::abandon();
+        eprintln!("littoral: internal error, please report it with the command line: {panic}");
+        std::process::exit(1);
+    }));
     // An interrupted program leaves no half-written files behind.
     let interrupted = ctrlc::set_handler(|| {
         littoral_data::write::abandon();

@@ -106,7 +106,8 @@ impl Profile {
                 write::whole(out, |sink| sink.write_all(text.as_bytes()))?;
             }
             (Some(out), Some(kind)) => {
-                let title = format!("{}: {} to {}", self.file.display(), shown(self.from), shown(self.to));
+                let name = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
+                let title = format!("{name}: {} to {}", shown(self.from), shown(self.to));
                 let plot =
                     Plot { title, size: self.size, points: points.iter().map(|p| (p.distance, p.height)).collect() };
                 plot.write(out, kind)?;

@@ -5,7 +5,7 @@ use crate::ground::{Frame, Opened, System, height_at};
 use crate::input::{self, Target, WaterLevel};
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
-use glam::{DVec2, DVec3, UVec2, Vec2};
+use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::{Land, coast};
 use littoral::picture::{self, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water};
 use littoral::space::{Ray, View};
@@ -24,7 +24,7 @@ use std::time::Instant;
   littoral render dem.tif                                  your land, from a view chosen by itself
   littoral render dem.tif --sun 240,12 --size 1920x1080 --out evening.png
   littoral render dem.tif --eye 562300,5107000,3200 --look 562300,5115800,1900
-  littoral render dem.tif --eye 562300,5107000,2 --look 562300,5115800 --above
+  littoral render dem.tif --eye 562300,5109500,2 --look 562300,5115800 --above
   littoral render dem.tif --style image --texture ortho.tif
   littoral render dem.tif --out linear.exr --passes depth,normal
   littoral render dem.tif --path                           a film: once round the land
@@ -57,7 +57,7 @@ pub struct Render {
     /// Coordinates are longitude and latitude in degrees
     #[arg(long, help_heading = "View")]
     lonlat: bool,
-    /// Angle between the picture's lower and upper edge in degrees
+    /// Angle between the picture's lower and upper edge in degrees [default: 45, or what suits a chosen view]
     #[arg(long, value_name = "DEGREES", value_parser = input::field_of_view, help_heading = "View")]
     fov: Option<f64>,
 
@@ -543,8 +543,48 @@ fn climate(frame: &Frame) -> Climate {
 
 /// A picture to lay over the ground.
 fn drape(file: &Path, subject: &Subject, talk: &mut Talk) -> Result<Drape, Failure> {
-    let _ = (subject, talk, Texture::size, Vec2::ONE);
-    Err(Failure::Work(format!("{}: pictures to lay over the ground cannot be read yet", file.display())))
+    let image = littoral_data::open_image(file)?;
+    for warning in &image.warnings {
+        talk.warn(format!("{}: {warning}", file.display()));
+    }
+    let (land, frame) = (&subject.land, &subject.frame);
+    let size = DVec2::new(image.columns as f64, image.rows as f64);
+    let texture = Texture::from_srgb(UVec2::new(image.columns as u32, image.rows as u32), &image.rgb);
+    // All of the land, its south-western corner at the picture's lower left one.
+    let everywhere = DAffine2::from_scale(DVec2::new(1.0, -1.0) / land.extent())
+        * DAffine2::from_translation(-(land.origin() + DVec2::Y * land.extent().y));
+    let Some(place) = &image.georeference else {
+        talk.warn(format!("{}: the picture says not where it lies: laid over all of the land", file.display()));
+        return Ok(Drape { texture, uv_from_local: everywhere });
+    };
+    let uv_from_crs = DAffine2::from_scale(1.0 / size)
+        * DAffine2::from_translation(DVec2::splat(0.5))
+        * place.crs_from_sample().inverse();
+    // From the land's metres to the picture's coordinates: exact at three corners of the land, an affine map between.
+    let corner = |share: DVec2| -> Result<DVec2, String> {
+        let crs = frame.crs(land.origin() + share * land.extent());
+        let same = place.crs == frame.system() || place.crs == littoral_data::Crs::Unknown;
+        let there = if same { crs } else { place.crs_from_lonlat(frame.lonlat(crs)?)? };
+        Ok(uv_from_crs.transform_point2(place.near(there)))
+    };
+    let corners = (|| Ok([corner(DVec2::ZERO)?, corner(DVec2::X)?, corner(DVec2::Y)?]))();
+    let [origin, east, north] = corners.map_err(|e: String| {
+        Failure::Work(format!("{}: {e}; convert the picture to the land's system", file.display()))
+    })?;
+    let uv_from_unit = DAffine2::from_mat2_translation(DMat2::from_cols(east - origin, north - origin), origin);
+    let unit_from_local = DAffine2::from_scale(1.0 / land.extent()) * DAffine2::from_translation(-land.origin());
+    let uv_from_local = uv_from_unit * unit_from_local;
+    let shares = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|share| uv_from_unit.transform_point2(share));
+    let (low, high) = (shares.into_iter().fold(shares[0], DVec2::min), shares.into_iter().fold(shares[0], DVec2::max));
+    if high.min_element() < 0.0 || low.max_element() > 1.0 {
+        let name = &subject.name;
+        let problem = format!("expected a picture that lies over {name}, got one of another place; name another");
+        return Err(Failure::Work(format!("{}: {problem}", file.display())));
+    }
+    if low.min_element() < -0.01 || high.max_element() > 1.01 {
+        talk.warn(format!("{}: the picture covers only a part of the land", file.display()));
+    }
+    Ok(Drape { texture, uv_from_local })
 }
 
 /// Complains about an output before any work is done: a missing folder, or one of the inputs.

@@ -58,7 +58,7 @@ pub fn image_from(mut input: Input) -> Result<Image, Error> {
         Error::content(&name, format!("expected a sound {format:?} picture, got: {e}; {hint}"))
     };
     let length = input.length();
-    let most_pixels = MOST_PIXELS.min(length.saturating_mul(MOST_PIXELS_A_BYTE) + (1 << 16));
+    let most_pixels = MOST_PIXELS.min(length.saturating_mul(MOST_PIXELS_A_BYTE).saturating_add(1 << 16));
     let mut reader = ImageReader::with_format(input.from_start()?, format);
     let mut limits = Limits::default();
     // Up to eight bytes a pixel while decoding; the decoder also keeps tables and rows.

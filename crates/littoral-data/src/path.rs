@@ -103,15 +103,15 @@ impl SavedPath {
             String::from("# A flight path for Littoral: edit it freely, then `littoral render FILE --path THIS`.\n");
         let coordinates = match self.coordinates {
             Coordinates::File => {
-                "\"file\"        # as the height file's own; or \"lonlat\", \"metres\" from its middle"
+                "\"file\"           # as the height file's own; or \"lonlat\", \"metres\" from its middle"
             }
-            Coordinates::LonLat => "\"lonlat\"      # degrees east and north; or \"file\", \"metres\"",
-            Coordinates::Metres => "\"metres\"      # east and north of the land's middle; or \"file\", \"lonlat\"",
+            Coordinates::LonLat => "\"lonlat\"         # degrees east and north; or \"file\", \"metres\"",
+            Coordinates::Metres => "\"metres\"         # east and north of the land's middle; or \"file\", \"lonlat\"",
         };
         let interpolation = match path.interpolation {
-            Interpolation::Straight => "\"straight\"    # or \"catmull-rom\", \"smooth\"",
-            Interpolation::CatmullRom => "\"catmull-rom\" # or \"straight\", \"smooth\"",
-            Interpolation::Smooth => "\"smooth\"      # or \"straight\", \"catmull-rom\"",
+            Interpolation::Straight => "\"straight\"     # or \"catmull-rom\", \"smooth\"",
+            Interpolation::CatmullRom => "\"catmull-rom\"  # or \"straight\", \"smooth\"",
+            Interpolation::Smooth => "\"smooth\"       # or \"straight\", \"catmull-rom\"",
         };
         let pace = match path.pace {
             Pace::Speed(speed) => {

@@ -122,12 +122,8 @@ impl Maker {
                 encoder.finish().expect("encodes")
             }
             34887 => {
-                let numbers: Vec<f32> = raw
-                    .as_chunks::<4>()
-                    .0
-                    .iter()
-                    .map(|b| if self.little { f32::from_le_bytes(*b) } else { f32::from_be_bytes(*b) })
-                    .collect();
+                // As libtiff: bytes of the file's order taken for native numbers.
+                let numbers: Vec<f32> = raw.as_chunks::<4>().0.iter().map(|bytes| f32::from_ne_bytes(*bytes)).collect();
                 lerc::encode_slice(self.chunk[0] as u32, rows as u32, &numbers, lerc::Precision::Lossless)
                     .expect("encodes")
             }
@@ -214,7 +210,8 @@ impl Maker {
         for plane in planes {
             for index in 0..across * down {
                 if self.sparse.contains(&index) {
-                    (offsets.push(0), counts.push(0));
+                    offsets.push(0);
+                    counts.push(0);
                     continue;
                 }
                 let chunk = self.chunk(index % across, index / across, plane);
@@ -230,7 +227,7 @@ impl Maker {
         let short = |values: &[u16]| {
             (3u16, values.iter().flat_map(|value| self.bytes(value.to_le_bytes())).collect::<Vec<u8>>(), values.len())
         };
-        let mut tags: Vec<(u16, (u16, Vec<u8>, usize))> = vec![
+        let mut tags: Vec<(u16, Values)> = vec![
             (256, long(&[self.columns])),
             (257, long(&[self.rows])),
             (258, short(&vec![self.kind.1; self.bands])),
@@ -270,6 +267,9 @@ impl Maker {
         (at, at + table.len())
     }
 }
+
+/// A tag's type, its values in the file's byte order, and how many they are.
+type Values = (u16, Vec<u8>, usize);
 
 fn open(bytes: Vec<u8>) -> Box<dyn Source> {
     tiff::open_input(Input::memory("made.tif", bytes)).expect("opens")

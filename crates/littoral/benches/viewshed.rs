@@ -1,11 +1,12 @@
 //! Viewsheds and lines of sight on one thread, in processor seconds.
 //!
 //! On an invented map by default; `LITTORAL_MAP=path` takes a square of little-endian `f32` heights instead, spread over
-//! 30 km. Medians of several runs; `cargo bench -p littoral --bench viewshed`.
+//! 30 km. Medians of several runs; `cargo bench -p littoral --bench viewshed`, with a part of a
+//! line's name for only those.
 
 use glam::DVec2;
 use littoral::field::{Land, Raster, noise::Fbm};
-use littoral::raycast::{Curvature, Station, Viewshed};
+use littoral::raycast::{Curvature, Simd, Station, Viewshed};
 
 const EXTENT: f64 = 30_000.0;
 
@@ -51,6 +52,7 @@ fn main() {
     let mut seen = vec![0; side * side];
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     println!("{side} × {side} samples, {:.2} m apart; one thread, processor seconds", raster.spacing().x);
+    let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
     let flat = None;
     let earth = Some(Curvature::EARTH);
     for (name, position, above_ground, curvature) in [
@@ -61,23 +63,26 @@ fn main() {
         ("summit, 1000 m above ground", summit, 1000.0, flat),
         ("summit, 1000 m above ground, curved Earth", summit, 1000.0, earth),
     ] {
-        for instructions in [2, 1, 0] {
+        for simd in [Simd::Avx512, Simd::Avx2, Simd::Portable].into_iter().filter(|simd| simd.available()) {
+            if wanted.as_ref().is_some_and(|wanted| !format!("{name} {simd:?}").contains(wanted)) {
+                continue;
+            }
             let asked = Viewshed { curvature, ..Viewshed::default() };
             let station = Station { position, above_ground };
             let mut run = || {
                 pool.install(|| {
                     let start = processor_seconds();
-                    let count = land.viewshed_with(station, &asked, &mut seen, instructions).expect("on the land");
+                    let count = land.viewshed_with(station, &asked, &mut seen, simd).expect("on the land");
                     (processor_seconds() - start, count)
                 })
             };
             let (_, count) = run();
-            let runs = if instructions == 0 { 3 } else { 7 };
+            let runs = if simd == Simd::Portable { 3 } else { 7 };
             let seconds = median((0..runs).map(|_| run().0).collect());
             let samples = (side * side) as f64;
             println!(
                 "{name:42} {:8} {seconds:.4} s  {:6.1} Msamples/s  seen {:5.2} %  own lines {:.3} % (whole {:.4} %)",
-                ["portable", "AVX2", "AVX-512"][usize::from(instructions)],
+                format!("{simd:?}"),
                 samples / seconds * 1e-6,
                 100.0 * count.seen as f64 / samples,
                 100.0 * count.lines as f64 / samples,
@@ -86,11 +91,28 @@ fn main() {
         }
     }
     let mut random = 1u64;
+    // The last viewshed against the definition, at random samples.
+    let (mut checked, mut differ) = (0, 0);
+    let observer = Station { position: summit, above_ground: 1000.0 };
+    if wanted.is_none() {
+        for curvature in [None, Some(Curvature::EARTH)] {
+            land.viewshed(observer, &Viewshed { curvature, ..Viewshed::default() }, &mut seen).expect("on the land");
+            for k in 0..10_000 {
+                let index = k * 7_919_317 % (side * side);
+                let target = Station { position: at(index % side, index / side), above_ground: 0.0 };
+                let free = land.sight(observer, target, curvature).expect("on the land").visible();
+                checked += 1;
+                differ += usize::from(free != (seen[index] == 255));
+            }
+        }
+        println!("{checked} random samples against their own lines of sight: {differ} differ");
+    }
     let mut next = || {
         random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         at(0, 0) + DVec2::new((random >> 40) as f64, (random >> 16 & 0xFF_FFFF) as f64) / 16_777_216.0 * land.extent()
     };
-    for above_ground in [2.0, 600.0] {
+    for above_ground in if wanted.is_none() { &[2.0, 600.0][..] } else { &[] } {
+        let above_ground = *above_ground;
         let pairs: Vec<_> =
             (0..4000).map(|_| [next(), next()].map(|position| Station { position, above_ground })).collect();
         let start = processor_seconds();

@@ -27,7 +27,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
     let channels = colour.channel_count() as usize;
     drop(decoder);
     // Run lengths pack at most 255 pixels into two bytes; a single bit may be a pixel.
-    check_fits(&input, columns, rows, input.length() * 128)?;
+    check_fits(&input, columns, rows, input.length().saturating_mul(128))?;
     let decoder = BmpDecoder::new(input.from_start()?).map_err(fails)?;
     let total = usize::try_from(decoder.total_bytes()).ok().filter(|&n| n == columns * rows * channels);
     let total = total.ok_or_else(|| Error::content(&name, format!("expected 8 bits a channel, got {colour:?}")))?;

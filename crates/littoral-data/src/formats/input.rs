@@ -68,6 +68,11 @@ impl Input {
         self.length
     }
 
+    /// Whether the bytes are read from a file, so that others may lie beside it.
+    pub(crate) fn is_on_disk(&self) -> bool {
+        matches!(self.bytes, Bytes::Disk(_))
+    }
+
     /// A content error that names this file.
     pub fn error(&self, problem: impl Into<String>) -> Error {
         Error::content(&self.name, problem)
@@ -93,6 +98,10 @@ impl Input {
     /// # Errors
     /// If the file cannot be read or ends before.
     pub fn read_at(&mut self, offset: u64, buffer: &mut [u8]) -> Result<(), Error> {
+        if offset.checked_add(buffer.len() as u64).is_none_or(|end| end > self.length) {
+            let problem = format!("expected {} bytes at offset {offset}, got the end of the file", buffer.len());
+            return Err(self.error(format!("{problem} after {} bytes; it is cut off", self.length)));
+        }
         self.seek(SeekFrom::Start(offset)).and_then(|_| self.read_exact(buffer)).map_err(|e| Error::io(&self.name, e))
     }
 

@@ -133,17 +133,20 @@ fn is_header(input: &Input) -> bool {
     input.name.extension().is_some_and(|e| e.eq_ignore_ascii_case("hdr"))
 }
 
-/// The samples that a header file belongs to, if this is one: people name either.
+/// The samples that a header file on disk belongs to, if this is one: people name either.
 fn samples_beside(input: &Input, head: &[u8]) -> Result<Option<Input>, Error> {
+    if !is_header(input) || !input.is_on_disk() {
+        return Ok(None);
+    }
     let text = String::from_utf8_lossy(head);
-    let extensions = match (envi::sniff_header(&text), esri_raw::sniff_header(&text) && is_header(input)) {
+    let extensions = match (envi::sniff_header(&text), esri_raw::sniff_header(&text)) {
         (true, _) => &envi::EXTENSIONS[..],
         (_, true) => &esri_raw::EXTENSIONS[..],
         _ => return Ok(None),
     };
-    let candidates =
+    let mut candidates =
         extensions.iter().flat_map(|e| [input.name.with_extension(e), input.name.with_extension(e.to_uppercase())]);
-    match candidates.into_iter().find(|path| *path != input.name && path.is_file()) {
+    match candidates.find(|path| path.is_file()) {
         Some(path) => Input::file(&path).map(Some),
         None => Err(input
             .error(format!("expected samples beside this header, got no file with an extension of {extensions:?}"))),
@@ -222,5 +225,42 @@ pub(crate) fn assume_degrees(info: &mut Info) {
             "no coordinate system is stated, but the coordinates look like degrees: taken as longitude and latitude"
                 .into(),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn either_of_header_and_samples_may_be_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let header = "ENVI\nsamples = 2\nlines = 2\ndata type = 2\nbyte order = 0\n";
+        let samples: Vec<u8> = [1i16, 2, 3, 4].iter().flat_map(|n| n.to_le_bytes()).collect();
+        std::fs::write(folder.path().join("a.hdr"), header).expect("writes");
+        assert!(open(&folder.path().join("a.hdr")).err().expect("alone").to_string().contains("beside"));
+        std::fs::write(folder.path().join("a.dat"), samples).expect("writes");
+        for name in ["a.hdr", "a.dat"] {
+            assert_eq!(open(&folder.path().join(name)).expect("opens").info().format, "ENVI");
+        }
+        // Headers under two data names must not send each other round in circles.
+        std::fs::write(folder.path().join("b.img"), header).expect("writes");
+        std::fs::write(folder.path().join("b.dat"), header).expect("writes");
+        assert!(open(&folder.path().join("b.img")).is_err());
+        assert!(open(folder.path()).err().expect("a folder").to_string().contains("folder"));
+        assert!(open(&folder.path().join("none.tif")).is_err());
+    }
+
+    #[test]
+    fn names_do_not_matter_where_content_tells() {
+        let grid = b"ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 5\n1 2\n3 4\n".to_vec();
+        for name in ["land.tif", "land.hgt", "land", "land.png", "a.hdr"] {
+            let source = open_input(Input::memory(name, grid.clone()));
+            assert!(source.is_ok_and(|s| s.info().format == "AAIGrid") || name == "a.hdr", "{name}");
+        }
+        let refused = open_input(Input::memory("land.tif", vec![0xFF, 0xD8, 0xFF, 0xE0, 0, 0]));
+        assert!(refused.err().expect("a picture").to_string().contains("JPEG"));
+        let unknown = open_input(Input::memory("land.tif", vec![1, 2, 3, 4]));
+        assert!(unknown.err().expect("nothing known").to_string().contains("01 02 03 04"));
     }
 }

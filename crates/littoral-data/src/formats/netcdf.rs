@@ -410,3 +410,154 @@ impl Source for NetcdfSource {
         Ok(heights)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use netcdf_writer::{NcAttrValue, NcFileBuilder, NcWriteFormat, NcWriteOptions};
+
+    const FORMATS: [NcWriteFormat; 2] = [NcWriteFormat::Classic, NcWriteFormat::Nc4];
+
+    fn finish(builder: NcFileBuilder, format: NcWriteFormat) -> Vec<u8> {
+        builder.to_vec(NcWriteOptions { format }).expect("writes").1
+    }
+
+    fn read(bytes: Vec<u8>) -> Result<(Info, Vec<f32>), Error> {
+        let mut source = open(Input::memory("t.nc", bytes))?;
+        let info = source.info().clone();
+        let all = source.read(0, Window { column: 0, row: 0, columns: info.columns, rows: info.rows })?;
+        // Windows agree with the whole.
+        let part = source.read(0, Window { column: 1, row: 1, columns: info.columns - 1, rows: 1 })?;
+        assert!(part.iter().zip(&all[info.columns + 1..]).all(|(a, b)| a == b || a.is_nan() && b.is_nan()));
+        Ok((info, all))
+    }
+
+    fn text(value: &str) -> NcAttrValue {
+        NcAttrValue::Chars(value.into())
+    }
+
+    /// Three by two samples whose heights are 10 × column + row from the north-west, with axes as asked for.
+    fn grid(format: NcWriteFormat, x_rises: bool, y_rises: bool, x_first: bool) -> Vec<u8> {
+        let mut builder = NcFileBuilder::new();
+        let y = builder.add_dimension("lat", 2).expect("adds");
+        let x = builder.add_dimension("lon", 3).expect("adds");
+        let longitudes = builder.add_variable::<f64>("lon", &[x]).expect("adds");
+        let latitudes = builder.add_variable::<f64>("lat", &[y]).expect("adds");
+        builder.add_variable_attribute(longitudes, "units", text("degrees_east")).expect("adds");
+        builder.add_variable_attribute(latitudes, "units", text("degrees_north")).expect("adds");
+        let z = builder.add_variable::<i16>("z", &if x_first { [x, y] } else { [y, x] }).expect("adds");
+        builder.add_variable_attribute(z, "scale_factor", NcAttrValue::Doubles(vec![0.5])).expect("adds");
+        builder.add_variable_attribute(z, "add_offset", NcAttrValue::Doubles(vec![100.0])).expect("adds");
+        builder.add_variable_attribute(z, "_FillValue", NcAttrValue::Shorts(vec![7])).expect("adds");
+        builder.add_variable_attribute(z, "units", text("feet")).expect("adds");
+        let order = |rises: bool, count: usize| -> Vec<usize> {
+            if rises { (0..count).collect() } else { (0..count).rev().collect() }
+        };
+        let columns = order(x_rises, 3);
+        // Row 0 is the north.
+        let rows = order(!y_rises, 2);
+        builder
+            .write_variable(longitudes, &columns.iter().map(|&c| 8.0 + 0.5 * c as f64).collect::<Vec<_>>())
+            .expect("writes");
+        builder
+            .write_variable(latitudes, &rows.iter().map(|&r| 50.0 - 0.25 * r as f64).collect::<Vec<_>>())
+            .expect("writes");
+        let raw = |c: usize, r: usize| if [c, r] == [2, 0] { 7 } else { (20 * c + 2 * r) as i16 };
+        let samples: Vec<i16> = match x_first {
+            false => rows.iter().flat_map(|&r| columns.iter().map(move |&c| raw(c, r))).collect(),
+            true => columns.iter().flat_map(|&c| rows.iter().map(move |&r| raw(c, r))).collect(),
+        };
+        builder.write_variable(z, &samples).expect("writes");
+        finish(builder, format)
+    }
+
+    #[test]
+    fn axes_of_any_order_and_direction() {
+        for format in FORMATS {
+            for case in 0..8 {
+                let bytes = grid(format, case & 1 == 0, case & 2 == 0, case & 4 == 0);
+                assert!(sniff(&bytes));
+                let (info, all) = read(bytes).expect("reads");
+                assert_eq!(info.georeference.geotransform, [7.75, 0.5, 0.0, 50.125, 0.0, -0.25], "{case}");
+                assert!(matches!(info.georeference.crs, Crs::Geographic { .. }));
+                for (index, height) in all.iter().enumerate() {
+                    let [c, r] = [index % 3, index / 3];
+                    let expected = (100.0 + 0.5 * (20 * c + 2 * r) as f64) * 0.3048;
+                    let void = [c, r] == [2, 0];
+                    assert!(
+                        if void { height.is_nan() } else { (f64::from(*height) - expected).abs() < 1e-4 },
+                        "{case}"
+                    );
+                }
+                assert!((info.step - 0.5 * 0.3048).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn depths_extra_dimensions_and_uneven_axes() {
+        for format in FORMATS {
+            let mut builder = NcFileBuilder::new();
+            let t = builder.add_dimension("time", 2).expect("adds");
+            let y = builder.add_dimension("y", 3).expect("adds");
+            let x = builder.add_dimension("x", 3).expect("adds");
+            let at = builder.add_variable::<f32>("x", &[x]).expect("adds");
+            let other = builder.add_variable::<f32>("other", &[y, x]).expect("adds");
+            let depth = builder.add_variable::<f32>("depth", &[t, y, x]).expect("adds");
+            builder.add_variable_attribute(depth, "positive", text("down")).expect("adds");
+            builder.add_variable_attribute(depth, "missing_value", NcAttrValue::Floats(vec![3.0])).expect("adds");
+            builder.add_variable_attribute(depth, "valid_max", NcAttrValue::Floats(vec![16.0])).expect("adds");
+            builder.write_variable(at, &[0.0f32, 300.0, 1000.0]).expect("writes");
+            builder.write_variable(other, &[0.0f32; 9]).expect("writes");
+            builder.write_variable(depth, &(0..18).map(|i| (2 * i) as f32 - 1.0).collect::<Vec<_>>()).expect("writes");
+            let (info, all) = read(finish(builder, format)).expect("reads");
+            assert_eq!(all[..2], [1.0, -1.0]);
+            assert!(all[2].is_nan());
+            assert_eq!(all[3..], [-5.0, -7.0, -9.0, -11.0, -13.0, -15.0]);
+            for words in ["downwards", "first slice", "evenly", "no coordinates y"] {
+                assert!(info.warnings.iter().any(|w| w.contains(words)), "{words}: {:?}", info.warnings);
+            }
+        }
+    }
+
+    #[test]
+    fn grids_of_gmt_3_run_from_the_north() {
+        let mut builder = NcFileBuilder::new();
+        let side = builder.add_dimension("side", 2).expect("adds");
+        let size = builder.add_dimension("xysize", 6).expect("adds");
+        let pairs: [(&str, [f64; 2]); 3] =
+            [("x_range", [0.0, 20.0]), ("y_range", [100.0, 105.0]), ("spacing", [10.0, 5.0])];
+        for (name, pair) in pairs {
+            let variable = builder.add_variable::<f64>(name, &[side]).expect("adds");
+            builder.write_variable(variable, &pair).expect("writes");
+        }
+        let dimension = builder.add_variable::<i32>("dimension", &[side]).expect("adds");
+        builder.write_variable(dimension, &[3, 2]).expect("writes");
+        let z = builder.add_variable::<f32>("z", &[size]).expect("adds");
+        builder.write_variable(z, &[1.0f32, 2.0, 3.0, 4.0, 5.0, f32::NAN]).expect("writes");
+        let (info, all) = read(finish(builder, NcWriteFormat::Classic)).expect("reads");
+        assert_eq!(info.georeference.geotransform, [-5.0, 10.0, 0.0, 107.5, 0.0, -5.0]);
+        assert_eq!(all[..5], [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert!(all[5].is_nan());
+    }
+
+    #[test]
+    fn broken_ones_are_errors_and_never_panic() {
+        for format in FORMATS {
+            let whole = grid(format, true, true, false);
+            for length in (0..whole.len()).step_by(37).filter(|&n| n >= 4) {
+                let _ = read(whole[..length].to_vec());
+            }
+            for at in (0..whole.len()).step_by(11) {
+                let mut broken = whole.clone();
+                broken[at] ^= 0xFF;
+                let _ = read(broken);
+            }
+        }
+        let mut version = grid(NcWriteFormat::Classic, true, true, false);
+        version[3] = 9;
+        assert!(read(version).expect_err("unknown").to_string().contains("version 9"));
+        let empty = finish(NcFileBuilder::new(), NcWriteFormat::Classic);
+        assert!(read(empty).expect_err("nothing in it").to_string().contains("two dimensions"));
+    }
+}

@@ -88,7 +88,7 @@ fn decode(input: &mut Input) -> Result<Pixels, Error> {
     let bits = header.bit_depth as u8;
     // The header is believed once the file could hold so many pixels, and before anything of their size is allocated.
     let bits_per_pixel = header.bits_per_pixel() as u64;
-    let most_pixels = (length * DEFLATE_MOST + 1024) * 8 / bits_per_pixel;
+    let most_pixels = length.saturating_mul(DEFLATE_MOST).saturating_add(1024).saturating_mul(8) / bits_per_pixel;
     let samples = super::check_size_fits(&name, length, columns, rows, most_pixels)?;
     let mut reader = decoder.read_info().map_err(fails)?;
     let (colour, depth) = reader.output_color_type();

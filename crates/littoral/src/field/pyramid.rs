@@ -144,7 +144,7 @@ impl RangePyramid {
         let held_extreme = before.low <= self.range.low || before.high >= self.range.high;
         let range = if held_extreme { raster_range(raster) } else { self.range.union(now) };
         let fits = |h: f32| h >= self.height(1) && h <= self.height(STEPS as u16);
-        let outgrown = !range.is_empty() && !(fits(range.low) && fits(range.high));
+        let outgrown = !(range.is_empty() || fits(range.low) && fits(range.high));
         if outgrown || (self.range.is_empty() && !range.is_empty()) {
             *self = RangePyramid::new(raster);
             return;
@@ -176,7 +176,8 @@ impl RangePyramid {
     /// Recomputes the nodes `window` of `levels[n]` from those of `levels[n - 1]`.
     fn reduce(&mut self, n: usize, window: Window) {
         let (fine, coarse) = (self.levels[n - 1], self.levels[n]);
-        let run = |values: &mut [u16], merge: fn(u16, u16) -> u16| {
+        #[inline(always)]
+        fn run(fine: Level, coarse: Level, window: Window, values: &mut [u16], merge: impl Fn(u16, u16) -> u16) {
             let (below, above) = values.split_at_mut(coarse.offset);
             let fines = &below[fine.offset..];
             for row in window.row..window.row + window.rows {
@@ -184,15 +185,19 @@ impl RangePyramid {
                 let north = &fines[(2 * row + 1).min(fine.rows - 1) * fine.columns..][..fine.columns];
                 let out = &mut above[row * coarse.columns + window.column..][..window.columns];
                 let (south, north) = (&south[2 * window.column..], &north[2 * window.column..]);
-                let pairs = south.chunks(2).zip(north.chunks(2));
-                for (out, (s, n)) in out.iter_mut().zip(pairs) {
-                    let last = s.len() - 1;
-                    *out = merge(merge(s[0], s[last]), merge(n[0], n[last]));
+                // Whole pairs first, in a form that compiles to vectors; the last node of a row may have one column only.
+                let whole = (south.len() / 2).min(out.len());
+                let (pairs, rest) = out.split_at_mut(whole);
+                for (out, (s, n)) in pairs.iter_mut().zip(south.chunks_exact(2).zip(north.chunks_exact(2))) {
+                    *out = merge(merge(s[0], s[1]), merge(n[0], n[1]));
+                }
+                if let [out] = rest {
+                    *out = merge(south[2 * whole], north[2 * whole]);
                 }
             }
-        };
-        run(&mut self.lows, u16::min);
-        run(&mut self.highs, u16::max);
+        }
+        run(fine, coarse, window, &mut self.lows, |a, b| a.min(b));
+        run(fine, coarse, window, &mut self.highs, |a, b| a.max(b));
     }
 }
 

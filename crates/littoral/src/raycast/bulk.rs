@@ -225,6 +225,9 @@ impl<'a> RayCaster<'a> {
 /// Rays that a thread takes at a time.
 pub(super) const PART: usize = 1 << 14;
 
+/// Level at which streams start: neither all the way down from the top, nor all the way up.
+const START: i32 = 5;
+
 /// A slice of rays, or some of it in some order.
 struct Stream<'a, T> {
     rays: &'a [LocalRay],
@@ -236,6 +239,8 @@ struct Stream<'a, T> {
 }
 
 impl<T: Copy> Rays for Stream<'_, T> {
+    const REFILL: u32 = 12;
+
     #[inline(always)]
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
         let left = self.order.map_or(self.rays.len(), <[i32]>::len) - self.next;
@@ -264,7 +269,7 @@ impl<T: Copy> Rays for Stream<'_, T> {
             let origin = [l.load(&numbers[0]), l.load(&numbers[1]), l.load(&numbers[2])];
             let direction = [l.load(&numbers[3]), l.load(&numbers[4]), l.load(&numbers[5])];
             let reach = l.load(&numbers[6]);
-            let (zero, top) = (l.splat(0.0), l.int(scene.top.min(scene.tune[4])));
+            let (zero, top) = (l.splat(0.0), l.int(scene.top.min(START)));
             block.set(l, scene, at, l.load_int(&id), origin, direction, reach, zero, top);
         }
         self.next += block.count;

@@ -11,7 +11,7 @@
 
 use super::lanes::Lanes;
 use super::scene::Scene;
-use super::stream::{BLOCK, Prepared, Rays, absolute};
+use super::stream::{Prepared, Rays, absolute};
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
@@ -138,6 +138,15 @@ impl<'a> ViewRays<'a> {
         }
     }
 
+    /// Writes down that the pixels of the fine beam at (x, y) see nothing.
+    fn nothing(&mut self, x: u32, y: u32) {
+        let columns = x.min(self.width)..(x + FINE).min(self.width);
+        for row in y..(y + FINE).min(self.rows.end) {
+            let line = (row - self.rows.start) as usize * self.width as usize;
+            self.distances[line + columns.start as usize..line + columns.end as usize].fill(f32::INFINITY);
+        }
+    }
+
     /// Moves the starts of beams as far as nothing can be met.
     #[inline(always)]
     fn march<L: Lanes>(&self, l: L, scene: &Scene, beams: &mut Beams) {
@@ -160,8 +169,14 @@ impl<'a> ViewRays<'a> {
             // Beyond this every ray of the beam has left the map, or the heights above it.
             let rises = l.lt(zero, z_low);
             let out = l.div(l.splat(scene.high - self.eye.z - scene.height), l.select(rises, z_low, l.splat(1.0)));
-            let across_map = l.mul(l.splat(self.diagonal(scene)), pace);
-            let end = l.min(l.select(rises, l.max(out, zero), l.splat(f32::INFINITY)), l.add(across_map, across_map));
+            // The slowest of its rays: on the axis where even that one moves fastest.
+            let slow_x = l.max(x_low, l.sub(zero, x_high));
+            let slow_y = l.max(y_low, l.sub(zero, y_high));
+            let slow = l.max(slow_x, slow_y);
+            let moves = l.lt(l.splat(1e-9), slow);
+            let far = l.div(l.splat(self.diagonal(scene)), l.select(moves, slow, l.splat(1.0)));
+            let end = l.select(rises, l.max(out, zero), l.splat(f32::INFINITY));
+            let end = l.min(l.select(moves, far, l.splat(f32::INFINITY)), end);
             let one = l.int(1);
             let mut active = l.lt(t, end);
             let (mut steps, most) = (0, 200);
@@ -200,12 +215,14 @@ impl<'a> ViewRays<'a> {
                 level = l.iselect(l.without(blocked, stop), l.isub(level, one), level);
                 active = l.without(active, l.or(stopped, l.le(end, t)));
             }
+            // Nothing is left to meet: the rays need not be walked at all.
+            let t = l.select(l.le(end, t), l.splat(f32::INFINITY), t);
             l.store(t, &mut beams.t[at..]);
             l.store_int(l.imax(level, one), &mut beams.level[at..]);
         }
     }
 
-    /// Twice the map's longer side and the way to it (cells): no ray goes further.
+    /// More than any ray over the map has gone along either axis (cells): the map's sides and the way to them.
     fn diagonal(&self, scene: &Scene) -> f32 {
         let from = |axis: usize| {
             (scene.cell[axis].abs() + scene.cells[axis]) as f32
@@ -234,6 +251,8 @@ fn node<L: Lanes>(l: L, scene: &Scene, axis: usize, cell: L::I, level: L::I) -> 
 }
 
 impl Rays for ViewRays<'_> {
+    const REFILL: u32 = 16;
+
     #[inline(always)]
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
         let across = self.width.div_ceil(TILE);
@@ -253,26 +272,35 @@ impl Rays for ViewRays<'_> {
                 continue;
             }
             let origin = [l.splat(self.eye.x), l.splat(self.eye.y), l.splat(self.eye.z)];
-            for at in (0..BLOCK).step_by(L::COUNT) {
-                // Four fine beams, each with its pixels row by row.
-                let beam = at as u32 / 16;
+            for beam in 0..4 {
                 let (bx, by) = (gx + beam % 2 * FINE, gy + beam / 2 * FINE);
                 let fine = (by / FINE * 16 + bx / FINE) as usize;
-                let ix = l.iadd(l.load_int(&PIXEL_X[at % 16..]), l.int((x + bx) as i32));
-                let iy = l.iadd(l.load_int(&PIXEL_Y[at % 16..]), l.int((y + by) as i32));
-                let inside = l.and(l.igt(l.int(self.width as i32), ix), l.igt(l.int(self.rows.end as i32), iy));
-                let id = l.iadd(l.imul(l.isub(iy, l.int(self.rows.start as i32)), l.int(self.width as i32)), ix);
-                let id = l.iselect(inside, id, l.int(NOWHERE));
-                let (px, py) = (l.add(l.float(ix), l.splat(self.sample.x)), l.add(l.float(iy), l.splat(self.sample.y)));
-                let mut direction = [px; 3];
-                for (axis, direction) in direction.iter_mut().enumerate() {
-                    let across = l.add(l.splat(self.corner[axis]), l.mul(l.splat(self.right[axis]), px));
-                    *direction = l.add(across, l.mul(l.splat(self.down[axis]), py));
+                if self.starts[fine] == f32::INFINITY {
+                    self.nothing(x + bx, y + by);
+                    continue;
                 }
-                let (from, level) = (l.splat(self.starts[fine]), l.int((self.levels[fine] + scene.tune[5]).max(1)));
-                block.set(l, scene, at, id, origin, direction, l.splat(f32::INFINITY), from, level);
+                for part in (0..16).step_by(L::COUNT) {
+                    let ix = l.iadd(l.load_int(&PIXEL_X[part..]), l.int((x + bx) as i32));
+                    let iy = l.iadd(l.load_int(&PIXEL_Y[part..]), l.int((y + by) as i32));
+                    let inside = l.and(l.igt(l.int(self.width as i32), ix), l.igt(l.int(self.rows.end as i32), iy));
+                    let line = l.imul(l.isub(iy, l.int(self.rows.start as i32)), l.int(self.width as i32));
+                    let id = l.iselect(inside, l.iadd(line, ix), l.int(NOWHERE));
+                    let px = l.add(l.float(ix), l.splat(self.sample.x));
+                    let py = l.add(l.float(iy), l.splat(self.sample.y));
+                    let mut direction = [px; 3];
+                    for (axis, direction) in direction.iter_mut().enumerate() {
+                        let across = l.add(l.splat(self.corner[axis]), l.mul(l.splat(self.right[axis]), px));
+                        *direction = l.add(across, l.mul(l.splat(self.down[axis]), py));
+                    }
+                    let (from, level) = (l.splat(self.starts[fine]), l.int(self.levels[fine]));
+                    let at = block.count + part;
+                    block.set(l, scene, at, id, origin, direction, l.splat(f32::INFINITY), from, level);
+                }
+                block.count += 16;
             }
-            block.count = BLOCK;
+            if block.count == 0 {
+                continue;
+            }
             return;
         }
     }

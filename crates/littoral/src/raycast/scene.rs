@@ -33,7 +33,6 @@ pub(super) struct Scene<'a> {
     /// No surface is lower or higher (m).
     pub low: f32,
     pub high: f32,
-    pub tune: [i32; 8],
 }
 
 impl<'a> Scene<'a> {
@@ -73,12 +72,6 @@ impl<'a> Scene<'a> {
             height: anchor.z as f32,
             low: range.low - hair - 1e-3,
             high: range.high + hair + 1e-3,
-            tune: std::env::var("TUNE")
-                .map(|t| {
-                    let v: Vec<i32> = t.split(',').map(|x| x.parse().unwrap()).collect();
-                    std::array::from_fn(|i| v[i])
-                })
-                .unwrap_or([4, 6, 1, 99, 5, 0, 0, 0]),
         })
     }
 

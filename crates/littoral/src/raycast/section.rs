@@ -10,6 +10,9 @@
 use crate::field::Land;
 use glam::DVec2;
 
+/// The pyramid's highest step of a node without ground.
+const EMPTY: u16 = 0;
+
 /// One parabola of a vertical section.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
@@ -81,6 +84,7 @@ pub(super) struct Line {
     /// Along the major axis: where it starts and how far it runs; along the minor one: where it starts and its slope.
     major: f64,
     run: f64,
+    per_run: f64,
     minor: f64,
     slope: f64,
 }
@@ -92,7 +96,7 @@ impl Line {
         let eastward = by.x.abs() >= by.y.abs();
         let (major, run, minor, rise) =
             if eastward { (from.x, by.x, from.y, by.y) } else { (from.y, by.y, from.x, by.x) };
-        Line { to, eastward, major, run, minor, slope: if run == 0.0 { 0.0 } else { rise / run } }
+        Line { to, eastward, major, run, per_run: 1.0 / run, minor, slope: if run == 0.0 { 0.0 } else { rise / run } }
     }
 
     /// The strips between neighbouring lattice lines of the major axis that the line touches: the half-open range of
@@ -109,6 +113,41 @@ impl Line {
         self.run >= 0.0
     }
 
+    /// Visits the strips from `first` up to `last` (not included) one by one, beginning at the line's start or at its end,
+    /// and passing over blocks of 2^level strips that `skip(level, block)` lets it: neighbouring blocks are tried ever
+    /// larger, and halved when refused. Stops when `visit` says so; returns whether it did.
+    #[inline]
+    pub fn walk(
+        &self,
+        land: &Land,
+        (first, last): (i64, i64),
+        from_start: bool,
+        mut skip: impl FnMut(u32, i64) -> bool,
+        mut visit: impl FnMut(i64) -> bool,
+    ) -> bool {
+        let upward = self.forward() == from_start;
+        let top = land.ranges().top();
+        let mut strip = if upward { first } else { last - 1 };
+        let mut level = 0;
+        while strip >= first && strip < last {
+            let block = strip >> level;
+            if level == 0 {
+                if visit(strip) {
+                    return true;
+                }
+            } else if !skip(level, block) {
+                level -= 1;
+                continue;
+            }
+            let border = if upward { (block + 1) << level } else { block << level };
+            strip = if upward { border } else { border - 1 };
+            if level < top && border & ((2 << level) - 1) == 0 {
+                level += 1;
+            }
+        }
+        false
+    }
+
     /// Position on the minor axis above one on the major axis.
     fn minor_at(&self, major: f64) -> f64 {
         if major == self.major + self.run {
@@ -116,6 +155,39 @@ impl Line {
             return end;
         }
         self.minor + self.slope * (major - self.major)
+    }
+
+    /// Fractions of the line, to rounding, between which it lies in the strips from `first` up to `last` (not included): the smaller
+    /// one first.
+    pub fn fractions(&self, first: i64, last: i64) -> (f64, f64) {
+        if self.run == 0.0 {
+            return (0.0, 1.0);
+        }
+        let (a, b) = ((first as f64 - self.major) * self.per_run, (last as f64 - self.major) * self.per_run);
+        (a.min(b).clamp(0.0, 1.0), a.max(b).clamp(0.0, 1.0))
+    }
+
+    /// The highest ground anywhere below the line within a block of 2^`level` strips, the `block`-th of its size; from the
+    /// pyramid, so never too low. Level 1 or more.
+    pub fn highest(&self, land: &Land, level: u32, block: i64) -> f64 {
+        let (low, high) = (self.major.min(self.major + self.run), self.major.max(self.major + self.run));
+        let (a, b) = ((block << level) as f64, ((block + 1) << level) as f64);
+        let (a, b) = (self.minor_at(a.max(low)), self.minor_at(b.min(high)));
+        // A line on the border of two nodes, or within rounding of it, counts for both.
+        let scale = 1.0 / (1u64 << level) as f64;
+        let (first, last) = (((a.min(b) - 1e-6) * scale) as usize, ((a.max(b) + 1e-6) * scale) as usize);
+        let pyramid = land.ranges();
+        let nodes = pyramid.levels[level as usize - 1];
+        let steps = |minor: usize| {
+            let (column, row) = if self.eastward { (block as usize, minor) } else { (minor, block as usize) };
+            if column < nodes.columns && row < nodes.rows {
+                pyramid.highs[nodes.offset + row * nodes.columns + column]
+            } else {
+                EMPTY
+            }
+        };
+        let highest = (first..=last).map(steps).fold(EMPTY, u16::max);
+        if highest == EMPTY { f64::NEG_INFINITY } else { f64::from(pyramid.height(highest)) }
     }
 
     /// The pieces within one strip, at most three, in order of the line; calls `visit` for each.
@@ -132,11 +204,7 @@ impl Line {
         let (majors, minors) =
             if self.eastward { (raster.columns(), raster.rows()) } else { (raster.rows(), raster.columns()) };
         let column = strip.clamp(0, majors as i64 - 2) as usize;
-        let row_of = |n: f64| (n.floor() as i64).clamp(0, minors as i64 - 2);
-        let (low, high) = (minor_a.min(minor_b), minor_a.max(minor_b));
-        let first = row_of(low);
-        // A strip that ends on a lattice line does not reach beyond it.
-        let last = ((high.ceil() as i64) - 1).clamp(first, minors as i64 - 2);
+        let (first, last) = rows_between(minor_a, minor_b, minors);
         let rising = minor_b >= minor_a;
         let count = last - first + 1;
         let mut start = (a, minor_a);
@@ -153,6 +221,29 @@ impl Line {
             visit(Piece { from: fraction(start.0), to: fraction(stop.0), ground });
             start = stop;
         }
+    }
+
+    /// The highest sample round the patches of one strip: nothing of the ground there is higher.
+    #[inline]
+    pub fn highest_sample(&self, land: &Land, strip: i64) -> f64 {
+        let (low, high) = (self.major.min(self.major + self.run), self.major.max(self.major + self.run));
+        let raster = land.raster();
+        let columns = raster.columns();
+        let (majors, minors, along, across) = if self.eastward {
+            (raster.columns(), raster.rows(), 1, columns)
+        } else {
+            (raster.rows(), raster.columns(), columns, 1)
+        };
+        let (a, b) = (self.minor_at((strip as f64).max(low)), self.minor_at(((strip + 1) as f64).min(high)));
+        let (first, last) = rows_between(a, b, minors);
+        let column = strip.clamp(0, majors as i64 - 2) as usize;
+        let heights = raster.heights();
+        let mut highest = f32::NEG_INFINITY;
+        for row in first..=last + 1 {
+            let index = row as usize * across + column * along;
+            highest = highest.max(heights[index]).max(heights[index + along]);
+        }
+        f64::from(highest)
     }
 
     /// The ground between two points (major, minor) of one patch.
@@ -173,20 +264,22 @@ impl Line {
         let (u0, u1) = (a - major as f64, b - major as f64);
         let (v0, v1) = (minor_a - minor as f64, minor_b - minor as f64);
         let height = |index: usize| f64::from(heights[index]);
-        // A line along the border of a patch needs only that border.
+        let known = |index: usize| {
+            !voids.any() || [0, along, across, along + across].iter().all(|corner| !voids.is_void(index + corner))
+        };
+        // A line along the border of a patch needs only one of the two patches that share it.
         if v0 == v1 && (v0 == 0.0 || v0 == 1.0) {
-            let index = if v0 == 0.0 { index } else { index + across };
-            if voids.any() && (voids.is_void(index) || voids.is_void(index + along)) {
+            if !(known(index) || v0 == 0.0 && minor > 0 && known(index - across)) {
                 return None;
             }
+            let index = if v0 == 0.0 { index } else { index + across };
             let (c0, c1) = (height(index), height(index + along));
             return Some(Parabola { start: c0 + (c1 - c0) * u0, end: c0 + (c1 - c0) * u1, bulge: 0.0 });
         }
-        let corners = [index, index + along, index + across, index + along + across];
-        if voids.any() && corners.iter().any(|&corner| voids.is_void(corner)) {
+        if !known(index) {
             return None;
         }
-        let [c00, c10, c01, c11] = corners.map(height);
+        let [c00, c10, c01, c11] = [index, index + along, index + across, index + along + across].map(height);
         let bilinear = |u: f64, v: f64| {
             let near = c00 + (c10 - c00) * u;
             let far = c01 + (c11 - c01) * u;
@@ -195,6 +288,19 @@ impl Line {
         let twist = (c00 - c10) + (c11 - c01);
         Some(Parabola { start: bilinear(u0, v0), end: bilinear(u1, v1), bulge: -twist * (u1 - u0) * (v1 - v0) })
     }
+}
+
+/// The first and last patch of a strip that a line from `a` to `b` on the minor axis touches. A line that ends on a lattice
+/// line does not reach beyond it.
+#[inline]
+fn rows_between(a: f64, b: f64, minors: usize) -> (i64, i64) {
+    let end = minors as i64 - 2;
+    // Positions on the land are not negative but for rounding, so that cutting off is rounding down.
+    let first = (a.min(b) as i64).clamp(0, end);
+    let high = a.max(b);
+    let last = high as i64;
+    let last = if last as f64 == high { last - 1 } else { last };
+    (first, last.clamp(first, end))
 }
 
 impl Land {

@@ -9,18 +9,18 @@ use super::bulk::{PART, RayCaster, Simd};
 use super::lanes::{Avx2, Avx512};
 use super::lanes::{Lanes, Portable};
 use super::scene::Scene;
-use super::stream::LocalRay;
+use super::stream::{LocalRay, blend};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Levels at which points are looked up, coarse to fine.
-const LOOKS: [i32; 2] = [5, 3];
-/// The points: sixteenths of the segment, from the middle of the first to the middle of the last.
+/// The looks, coarse to fine: level of the nodes, and shift of the points in thirty-seconds of the segment.
+const LOOKS: [(i32, f32); 3] = [(4, 0.0), (2, 0.0), (2, 1.0)];
+/// The points: one in every sixteenth of the segment.
 const POINTS: [f32; 16] = {
     let mut points = [0.0; 16];
     let mut i = 0;
     while i < 16 {
-        points[i] = (i as f32 + 0.5) / 16.0;
+        points[i] = (i as f32 + 0.5) / 16.0 - 1.0 / 64.0;
         i += 1;
     }
     points
@@ -36,7 +36,8 @@ impl RayCaster<'_> {
         assert_eq!(segments.len(), visible.len(), "expected as many answers as segments");
         let (mut rays, mut open, mut hits) = (Vec::with_capacity(BATCH), Vec::with_capacity(BATCH), [false; BATCH]);
         for (segments, visible) in segments.chunks(BATCH).zip(visible.chunks_mut(BATCH)) {
-            (rays.clear(), open.clear());
+            rays.clear();
+            open.clear();
             visible.fill(false);
             match &self.scene {
                 // Through a hole a ray may get under the surface without meeting it.
@@ -92,25 +93,45 @@ const BATCH: usize = 1024;
 
 #[inline(always)]
 fn looks<L: Lanes>(l: L, scene: &Scene, segments: &[[Vec3; 2]], open: &mut Vec<usize>) {
-    for (index, [from, to]) in segments.iter().enumerate() {
-        let along = *to - *from;
-        let x = (from.x * scene.per_metre.x + scene.offset.x, along.x * scene.per_metre.x);
-        let y = (from.y * scene.per_metre.y + scene.offset.y, along.y * scene.per_metre.y);
-        let z = (from.z + scene.height, along.z);
+    let mut candidates = [0u16; BATCH];
+    let mut count = 0;
+    for (index, segment) in segments.iter().enumerate() {
+        let along = segment[1] - segment[0];
+        let x = (segment[0].x * scene.per_metre.x + scene.offset.x, along.x * scene.per_metre.x);
+        let y = (segment[0].y * scene.per_metre.y + scene.offset.y, along.y * scene.per_metre.y);
+        let z = (segment[0].z + scene.height, along.z);
         let mut blocked = false;
-        if starts_above(scene, x.0, y.0, z.0) {
-            for level in LOOKS {
-                for at in (0..16).step_by(L::COUNT) {
-                    let t = l.load(&POINTS[at..]);
-                    blocked |= under(l, scene, level.min(scene.top), t, [x, y, z]);
-                }
-                if blocked {
-                    break;
-                }
+        for (level, shift) in LOOKS {
+            for at in (0..16).step_by(L::COUNT) {
+                let t = l.add(l.load(&POINTS[at..]), l.splat(shift / 32.0));
+                blocked |= under(l, scene, level.min(scene.top), t, [x, y, z]);
+            }
+            if blocked {
+                break;
             }
         }
-        if !blocked {
+        if blocked {
+            candidates[count] = index as u16;
+            count += 1;
+        } else {
             open.push(index);
+        }
+    }
+    // Only those that start above the surface are surely blocked. Their heights come last and together, since each is far
+    // from the others in memory.
+    for at in (0..count).step_by(L::COUNT) {
+        let (mut x, mut y, mut z) = ([0.0; 16], [0.0; 16], [0.0; 16]);
+        for lane in 0..L::COUNT {
+            let segment = &segments[candidates[(at + lane).min(count - 1)] as usize];
+            x[lane] = segment[0].x * scene.per_metre.x + scene.offset.x;
+            y[lane] = segment[0].y * scene.per_metre.y + scene.offset.y;
+            z[lane] = segment[0].z + scene.height;
+        }
+        let above = l.bits(starts_above(l, scene, l.load(&x), l.load(&y), l.load(&z)));
+        for lane in 0..L::COUNT.min(count - at) {
+            if above >> lane & 1 == 0 {
+                open.push(candidates[at + lane] as usize);
+            }
         }
     }
 }
@@ -132,17 +153,20 @@ fn under<L: Lanes>(l: L, scene: &Scene, level: i32, t: L::F, [x, y, z]: [(f32, f
     l.bits(l.and(inside, l.lt(l.add(l.splat(z.0), l.mul(l.splat(z.1), t)), low))) != 0
 }
 
-/// Whether a point of the lattice lies over the surface (not merely beside the map).
+/// Whether points of the lattice lie over the surface (not merely beside the map).
 #[inline(always)]
-fn starts_above(scene: &Scene, x: f32, y: f32, z: f32) -> bool {
-    let (column, row) = (x.floor(), y.floor());
-    let (i, j) = (column as i32 + scene.cell[0], row as i32 + scene.cell[1]);
-    if !(i >= 0 && j >= 0 && i < scene.cells[0] && j < scene.cells[1]) {
-        return false;
-    }
-    let at = j as usize * scene.columns as usize + i as usize;
-    let (south, north) = (&scene.heights[at..at + 2], &scene.heights[at + scene.columns as usize..][..2]);
-    let (u, v) = (x - column, y - row);
-    let height = (south[0] * (1.0 - u) + south[1] * u) * (1.0 - v) + (north[0] * (1.0 - u) + north[1] * u) * v;
-    z > height
+fn starts_above<L: Lanes>(l: L, scene: &Scene, x: L::F, y: L::F, z: L::F) -> L::M {
+    let (column, row) = (l.floor(x), l.floor(y));
+    let (i, j) = (l.iadd(column, l.int(scene.cell[0])), l.iadd(row, l.int(scene.cell[1])));
+    let (inner_i, inner_j) = (
+        l.imax(l.imin(i, l.int(scene.cells[0] - 1)), l.int(0)),
+        l.imax(l.imin(j, l.int(scene.cells[1] - 1)), l.int(0)),
+    );
+    let inside = l.and(l.ieq(i, inner_i), l.ieq(j, inner_j));
+    let at = l.iadd(l.imul(inner_j, l.int(scene.columns)), inner_i);
+    // SAFETY: the patch was clamped to the raster's; it has samples east, north and north-east.
+    let ((a, b), (c, d)) =
+        unsafe { (l.gather_pair(scene.heights, at), l.gather_pair(scene.heights, l.iadd(at, l.int(scene.columns)))) };
+    let height = blend(l, [a, b, c, d], l.sub(x, l.float(column)), l.sub(y, l.float(row)));
+    l.and(inside, l.lt(height, z))
 }

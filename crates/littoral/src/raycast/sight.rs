@@ -10,10 +10,14 @@
 use super::section::{Line, Parabola};
 use crate::field::Land;
 use glam::{DVec2, DVec3};
+use std::cell::Cell;
 
 /// How deep below the ground (m) a line of sight may pass and still count as free: a line that touches the ground is not
 /// blocked. Heights are `f32`, whose steps are 0.5 mm at 8000 m: less would only measure rounding.
 pub const GRAZE: f64 = 1e-3;
+
+/// How many strips of a line are looked at before the others: more cost more than they spare.
+const PROBES: i64 = 16;
 
 /// A point some way above the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,6 +140,10 @@ impl SightLine {
     /// Whether the ground of a strip is in the way.
     #[inline]
     pub fn blocked_in(&self, land: &Land, strip: i64) -> bool {
+        // Most strips lie well below the line.
+        if self.lowest_over(strip, strip + 1) >= self.line.highest_sample(land, strip) {
+            return false;
+        }
         let mut blocked = false;
         self.clearances(land, strip, |_, _, clearance| {
             blocked |= clearance.is_some_and(|clearance| clearance.lowest().0 < -GRAZE);
@@ -143,10 +151,29 @@ impl SightLine {
         blocked
     }
 
+    /// Whether the ground is in the way anywhere between the strips `first` and `last` (not included). Looks first where
+    /// the line ends, since what hides a point is most often close in front of it.
+    pub fn blocked_between(&self, land: &Land, first: i64, last: i64) -> bool {
+        let skip = |level, block| self.least_over(land, level, block) >= 0.0;
+        self.line.walk(land, (first, last), false, skip, |strip| self.blocked_in(land, strip))
+    }
+
     /// Whether the ground is in the way anywhere.
     pub fn blocked(&self, land: &Land) -> bool {
-        // From the far end: what hides a point is most often close in front of it.
-        self.line.strips().any(|strip| self.blocked_in(land, strip))
+        let strips = self.line.strips();
+        self.blocked_between(land, strips.start, strips.end)
+    }
+
+    /// A lower bound of the distance (m) between line and ground over a block of 2^`level` strips.
+    fn least_over(&self, land: &Land, level: u32, block: i64) -> f64 {
+        self.lowest_over(block << level, (block + 1) << level) - self.line.highest(land, level, block)
+    }
+
+    /// A lower bound of the line's height (m) over the strips from `first` up to `last` (not included).
+    #[inline]
+    fn lowest_over(&self, first: i64, last: i64) -> f64 {
+        let (from, to) = self.line.fractions(first, last);
+        self.height + (self.rise * from).min(self.rise * to) + self.drop * from * from
     }
 }
 
@@ -177,29 +204,50 @@ impl Land {
         let line = SightLine::new(self, ends.0, ends.1, drop_per_square);
         let distance = ((end - start) * self.raster().spacing()).length();
 
-        let (mut clearance, mut clearance_fraction) =
+        let nearer_end =
             if to.above_ground < from.above_ground { (to.above_ground, 1.0) } else { (from.above_ground, 0.0) };
-        let mut blocked_at = (from.above_ground < -GRAZE).then_some(0.0);
+        let clearance = Cell::new(nearer_end);
+        let blocked_at = Cell::new((from.above_ground < -GRAZE).then_some(0.0));
         let mut over_void = 0.0;
         let strips = line.strips();
-        let forward = line.line.forward();
-        for step in strips.clone() {
-            let strip = if forward { step } else { strips.start + strips.end - 1 - step };
+        // Blocks that can neither lower the clearance nor hold the first obstacle are passed over. Voids are to be
+        // measured, so that lands with voids are walked strip by strip.
+        let known = !self.raster().voids().any();
+        let skip = |level, block| {
+            let matters = if blocked_at.get().is_some() { clearance.get().0 } else { clearance.get().0.max(-GRAZE) };
+            known && line.least_over(self, level, block) >= matters
+        };
+        let lower = |from: f64, to: f64, piece: &Parabola| {
+            let (lowest, v) = piece.lowest();
+            if lowest < clearance.get().0 {
+                clearance.set((lowest, from + (to - from) * v));
+            }
+            (lowest, v)
+        };
+        // A few strips looked at beforehand give a low clearance to begin with, below which most blocks do not reach.
+        for probe in 0..PROBES {
+            let strip = strips.start + (strips.end - strips.start) * (2 * probe + 1) / (2 * PROBES);
+            line.clearances(self, strip, |from, to, piece| {
+                piece.inspect(|piece| {
+                    lower(from, to, piece);
+                });
+            });
+        }
+        line.line.walk(self, (strips.start, strips.end), true, skip, |strip| {
             line.clearances(self, strip, |from, to, piece| match piece {
                 Some(piece) => {
-                    let (lowest, v) = piece.lowest();
-                    if lowest < clearance {
-                        (clearance, clearance_fraction) = (lowest, from + (to - from) * v);
-                    }
-                    if blocked_at.is_none() && lowest < -GRAZE {
+                    let (lowest, v) = lower(from, to, &piece);
+                    if blocked_at.get().is_none() && lowest < -GRAZE {
                         let v = piece.first_at_most(-GRAZE).unwrap_or(v);
-                        blocked_at = Some(from + (to - from) * v);
+                        blocked_at.set(Some(from + (to - from) * v));
                     }
                 }
                 None => over_void += (to - from) * distance,
             });
-        }
-        let blocked_at = blocked_at.or((to.above_ground < -GRAZE).then_some(1.0)).map(|fraction| {
+            false
+        });
+        let (clearance, clearance_fraction) = clearance.get();
+        let blocked_at = blocked_at.get().or((to.above_ground < -GRAZE).then_some(1.0)).map(|fraction| {
             let lattice = start + (end - start) * fraction;
             let position = self.origin() + lattice * self.raster().spacing();
             let z = ends.0.1 + line.rise * fraction + line.drop * fraction * fraction;

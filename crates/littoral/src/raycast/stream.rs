@@ -91,6 +91,7 @@ impl Prepared {
     /// Prepares lanes `at..at + COUNT` from positions and directions in metres from the anchor. `from` is the distance
     /// before which nothing can be met, `level` the level to begin with.
     #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "the numbers of a ray, each once")]
     pub fn set<L: Lanes>(
         &mut self,
         l: L,
@@ -185,6 +186,10 @@ impl Prepared {
 
 /// Where rays come from and where their answers go.
 pub(super) trait Rays {
+    /// Lanes that must have ended before lanes are refilled, in sixteenths of all: neighbours end together and are best
+    /// replaced together, strangers sooner.
+    const REFILL: u32;
+
     /// Overwrites `block` with the next rays; `count` = 0 when there are none left.
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared);
     /// The distance of the first hit, infinity for none.
@@ -195,10 +200,9 @@ pub(super) trait Rays {
 
 /// What a lane's result holds while the ray is found to start below the surface.
 const BELOW: f32 = -1.0;
-/// Lanes that must wait at patches before patches are tested, and that must have ended before lanes are refilled, in
-/// sixteenths of all lanes: more wastes waiting lanes, less wastes whole tests. The optimum is flat.
-const PATIENCE: u32 = 6;
-const REFILL: u32 = 4;
+/// Lanes that must wait at patches before patches are tested, in sixteenths of all: more wastes waiting lanes, less wastes
+/// whole tests. The optimum is flat.
+const PATIENCE: u32 = 7;
 
 /// As many rays as there are lanes.
 struct Packet<L: Lanes> {
@@ -276,7 +280,7 @@ impl<L: Lanes> Packet<L> {
     ) -> bool {
         let all = (1u32 << L::COUNT) - 1;
         let done = l.bits(l.igt(l.int(0), self.level));
-        if done.count_ones() * 16 < scene.tune[0] as u32 * L::COUNT as u32 {
+        if done.count_ones() * 16 < R::REFILL * L::COUNT as u32 {
             return true;
         }
         let mut deliver = done & self.occupied;
@@ -377,7 +381,7 @@ impl<L: Lanes> Packet<L> {
         let mut hit = l.mask(0);
         let patches = l.ieq(self.level, zero);
         let (waiting, walking) = (l.bits(patches), l.bits(inner));
-        if waiting != 0 && (walking == 0 || waiting.count_ones() * 16 >= scene.tune[1] as u32 * L::COUNT as u32) {
+        if waiting != 0 && (walking == 0 || waiting.count_ones() * 16 >= PATIENCE * L::COUNT as u32) {
             let column = l.iselect(patches, column, zero);
             let row = l.iselect(patches, row, zero);
             let here = l.iadd(l.imul(row, l.int(scene.columns)), column);
@@ -473,13 +477,13 @@ impl<L: Lanes> Packet<L> {
         self.cell_y = l.iselect(advance, l.iselect(x_first, follow_y, next_y), self.cell_y);
         self.t = l.select(advance, leave, self.t);
 
-        // A level up where the line ends the coarser node as well, down into nodes that are in the way.
-        let ends = l.ieq(l.iand(line, l.shl(l.int(scene.tune[2]), self.level)), zero);
+        // A level up where the line ends the coarser node as well (where nearest hits are sought, the next coarser one too:
+        // they are mostly near by), down into nodes that are in the way.
+        let ends = l.ieq(l.iand(line, l.shl(l.int(if ANY { 1 } else { 3 }), self.level)), zero);
         let up = l.and(l.and(advance, ends), l.igt(l.int(scene.top), self.level));
         let finished = l.or(hit, l.and(advance, l.le(self.end, leave)));
         let mut level = l.iselect(up, l.iadd(self.level, one), self.level);
-        let down = l.iselect(l.igt(self.level, l.int(scene.tune[3])), l.int(2), one);
-        level = l.iselect(l.without(inner, clear), l.isub(self.level, down), level);
+        level = l.iselect(l.without(inner, clear), l.isub(self.level, one), level);
         self.level = l.iselect(finished, l.int(-1), level);
     }
 }

@@ -22,8 +22,8 @@ mod lanes;
 mod near;
 mod sweep;
 
-use super::GRAZE;
 use super::sight::{Curvature, SightError, SightLine, Station, drop_per_square};
+use super::{GRAZE, Simd};
 use crate::field::Land;
 use frame::Frame;
 use glam::DVec2;
@@ -72,8 +72,8 @@ struct Scene<'a> {
     drop_per_square: f64,
     /// How far below the bilinear interpolation of its corners' drops a curved Earth's drop may lie within a patch (m).
     sag: f64,
-    /// Which instructions may be used: 0 portable, 1 AVX2, 2 AVX-512.
-    instructions: u8,
+    /// Which instructions to use.
+    simd: Simd,
 }
 
 /// A sample whose bounds did not decide.
@@ -118,19 +118,23 @@ impl Land {
     /// # Panics
     /// If `seen` does not hold one number for each sample.
     pub fn viewshed(&self, observer: Station, asked: &Viewshed, seen: &mut [u8]) -> Result<ViewshedCount, SightError> {
-        self.viewshed_with(observer, asked, seen, 2)
+        self.viewshed_with(observer, asked, seen, Simd::best())
     }
 
-    /// [`Land::viewshed`] with at most the given instructions: 0 portable, 1 AVX2, 2 AVX-512. For tests.
-    #[doc(hidden)]
+    /// [`Land::viewshed`] with other instructions than the best there are: for tests and comparisons. All give the
+    /// same answer.
+    ///
+    /// # Panics
+    /// If the processor does not have them.
     pub fn viewshed_with(
         &self,
         observer: Station,
         asked: &Viewshed,
         seen: &mut [u8],
-        instructions: u8,
+        simd: Simd,
     ) -> Result<ViewshedCount, SightError> {
         let raster = self.raster();
+        assert!(simd.available(), "expected instructions that this processor has, got {simd:?}");
         assert_eq!(seen.len(), raster.heights().len(), "expected room for one number for each sample");
         if !asked.target_height.is_finite() {
             return Err(SightError::Number("a finite target height (m)", asked.target_height));
@@ -153,33 +157,39 @@ impl Land {
             radius: asked.radius,
             drop_per_square,
             sag: 0.25 * drop_per_square * raster.spacing().length_squared(),
-            instructions,
+            simd,
         };
 
+        let mut count = ViewshedCount::default();
+        if scene.is_beyond_reason() {
+            scene.line_by_line(seen, &mut count);
+            count.seen -= scene.forget(seen);
+            return Ok(count);
+        }
         let wedges = scene.wedges();
         let marks = Seen { marks: seen.as_mut_ptr(), len: seen.len() };
-        let decided: Vec<(Frame, Vec<(Pending, bool)>)> = wedges
+        let decided: Vec<_> = wedges
             .into_par_iter()
             .map(|(frame, from, to)| {
-                let pending = sweep::sweep(&scene, &frame, from, to, &marks);
+                let found = sweep::sweep(&scene, &frame, from, to, &marks);
                 let free = |pending: &Pending| (*pending, scene.free(&frame, pending));
-                (frame, pending.iter().map(free).collect())
+                (frame, found.seen, found.pending.iter().map(free).collect::<Vec<_>>())
             })
             .collect();
 
-        let mut count = ViewshedCount::default();
-        for (frame, pending) in &decided {
+        for (frame, marked, pending) in &decided {
+            count.seen += marked;
             count.lines += pending.len();
             for (pending, free) in pending {
                 count.whole_lines += usize::from(pending.since == 0);
                 if *free {
                     seen[frame.index(frame.major(pending.ring), pending.minor)] = 255;
+                    count.seen += 1;
                 }
             }
         }
         scene.look_around(seen, &mut count);
-        scene.forget(seen);
-        count.seen = seen.par_chunks(1 << 16).map(|part| part.iter().filter(|&&mark| mark == 255).count()).sum();
+        count.seen -= scene.forget(seen);
         Ok(count)
     }
 }
@@ -222,6 +232,26 @@ impl Scene<'_> {
         }
     }
 
+    /// Whether heights are so great that single precision could overflow or mean nothing: no land is like that.
+    fn is_beyond_reason(&self) -> bool {
+        let range = self.land.ranges().range();
+        let drop = self.drop_per_square * self.land.extent().length_squared();
+        let greatest = f64::from(range.low.abs().max(range.high.abs()));
+        greatest.max(self.eye_height.abs()).max(self.target_height).max(drop) >= 1e7
+    }
+
+    /// Decides every sample by its line of sight.
+    fn line_by_line(&self, seen: &mut [u8], count: &mut ViewshedCount) {
+        let columns = self.land.raster().columns();
+        seen.par_iter_mut().enumerate().for_each(|(index, mark)| {
+            let target = DVec2::new((index % columns) as f64, (index / columns) as f64);
+            *mark = if self.line(target, index).blocked(self.land) { 0 } else { 255 };
+        });
+        count.lines = seen.len();
+        count.whole_lines = seen.len();
+        count.seen = seen.iter().filter(|&&mark| mark != 0).count();
+    }
+
     /// Decides the samples close to the eye, one by one.
     fn look_around(&self, seen: &mut [u8], count: &mut ViewshedCount) {
         let raster = self.land.raster();
@@ -233,32 +263,38 @@ impl Scene<'_> {
             for column in around(self.eye.x, raster.columns()) {
                 let index = row * raster.columns() + column;
                 let line = self.line(DVec2::new(column as f64, row as f64), index);
-                seen[index] = if line.blocked(self.land) { 0 } else { 255 };
                 count.lines += 1;
+                if !line.blocked(self.land) {
+                    seen[index] = 255;
+                    count.seen += 1;
+                }
             }
         }
     }
 
-    /// Unmarks voids and what is beyond the radius.
-    fn forget(&self, seen: &mut [u8]) {
+    /// Unmarks voids and what is beyond the radius; returns how many marks that took.
+    fn forget(&self, seen: &mut [u8]) -> usize {
+        let mut forgotten = 0;
+        let mut unmark = |mark: &mut u8| forgotten += usize::from(std::mem::take(mark) != 0);
         let raster = self.land.raster();
         for (word, bits) in raster.voids().words().iter().enumerate() {
             let mut bits = *bits;
             while bits != 0 {
-                seen[word * 64 + bits.trailing_zeros() as usize] = 0;
+                unmark(&mut seen[word * 64 + bits.trailing_zeros() as usize]);
                 bits &= bits - 1;
             }
         }
         if self.radius.is_infinite() {
-            return;
+            return forgotten;
         }
         for (row, marks) in seen.chunks_exact_mut(raster.columns()).enumerate() {
             for (column, mark) in marks.iter_mut().enumerate().filter(|(_, mark)| **mark != 0) {
                 let away = (DVec2::new(column as f64, row as f64) - self.eye) * raster.spacing();
                 if away.length() > self.radius {
-                    *mark = 0;
+                    unmark(mark);
                 }
             }
         }
+        forgotten
     }
 }

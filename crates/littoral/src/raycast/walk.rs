@@ -13,7 +13,7 @@
 //! Works this rests on: J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987;
 //! A. Tevs et al., "Maximum mipmaps", I3D 2008; the stable quadratic of W. H. Press et al., *Numerical Recipes*, §5.6.
 
-use crate::field::{HeightRange, Land};
+use crate::field::{HeightRange, Land, Raster};
 use crate::space::Ray;
 use glam::DVec2;
 
@@ -40,6 +40,8 @@ struct Axis {
     mirrored: bool,
     /// What turns a mirrored cell into one of the raster by exclusive or.
     mirror: u32,
+    /// Positions this near a line between cells may have been rounded across it.
+    hair: f64,
     /// First cell that exists, and one past the last.
     first: u32,
     end: u32,
@@ -50,21 +52,11 @@ impl Axis {
     fn new(origin: f64, direction: f64, cells: u32, side: u32) -> Axis {
         // Slower than this the ray would need 10¹⁸ of its lengths to cross a cell: it stands still.
         let still = direction.abs() < 1e-18;
-        if direction < 0.0 {
-            let mirrored = (f64::from(side) - origin, -direction);
-            let (origin, direction) = mirrored;
-            return Axis {
-                origin,
-                direction,
-                inverse: 1.0 / direction,
-                still,
-                mirrored: true,
-                mirror: side - 1,
-                first: side - cells,
-                end: side,
-            };
-        }
-        Axis { origin, direction, inverse: 1.0 / direction, still, mirrored: false, mirror: 0, first: 0, end: cells }
+        let hair = 1e-14 * (origin.abs() + f64::from(side));
+        let mirrored = direction < 0.0;
+        let (origin, direction) = if mirrored { (f64::from(side) - origin, -direction) } else { (origin, direction) };
+        let (mirror, first, end) = if mirrored { (side - 1, side - cells, side) } else { (0, 0, cells) };
+        Axis { origin, direction, inverse: 1.0 / direction, still, mirrored, mirror, hair, first, end }
     }
 
     /// Where the ray crosses the line between two cells, `f64::INFINITY` if never. Every crossing is this expression.
@@ -85,9 +77,14 @@ impl Axis {
     /// The cell that the ray is in at distance `t`, among `least..=most`.
     #[inline(always)]
     fn cell(&self, t: f64, least: u32, most: u32) -> u32 {
-        let mut cell = ((self.origin + t * self.direction) as i64).clamp(i64::from(least), i64::from(most)) as u32;
+        let position = self.origin + t * self.direction;
+        let mut cell = (position as i64).clamp(i64::from(least), i64::from(most)) as u32;
+        let fraction = position - f64::from(cell);
+        if fraction > self.hair && fraction < 1.0 - self.hair {
+            return cell;
+        }
         // Rounding may have put the position on the other side of a line: what counts is the crossing.
-        while cell > least && self.crossing(cell) > t && !self.still {
+        while cell > least && !self.still && self.crossing(cell) > t {
             cell -= 1;
         }
         while cell < most && self.crossing(cell + 1) <= t {
@@ -143,8 +140,11 @@ pub(super) fn first_crossing(land: &Land, ray: &Ray, pyramid: bool) -> Option<Cr
     }
 
     let top = if pyramid { ranges.top() } else { 0 };
+    // A start in the middle: rays near the ground need not come down from the top, others are soon up there.
+    let middle = top.min(5);
+    let voids = raster.voids().any();
     let (mut i, mut j) = (x.cell(start, x.first, x.end - 1), y.cell(start, y.first, y.end - 1));
-    let (mut t, mut level) = (start, top);
+    let (mut t, mut level) = (start, middle);
     loop {
         let (next_i, next_j) = (((i >> level) + 1) << level, ((j >> level) + 1) << level);
         let (tx, ty) = (x.crossing(next_i), y.crossing(next_j));
@@ -161,7 +161,7 @@ pub(super) fn first_crossing(land: &Land, ray: &Ray, pyramid: bool) -> Option<Cr
             }
         } else {
             let (column, row) = ((i ^ x.mirror) as usize, (j ^ y.mirror) as usize);
-            if let Some(corners) = land.corners(column, row) {
+            if let Some(corners) = patch_corners(raster, voids, column, row) {
                 let begin = x.crossing_or_start(i).max(y.crossing_or_start(j)).max(start);
                 let finish = tx.min(ty).min(end).max(begin);
                 let (from, to) = (
@@ -192,7 +192,7 @@ pub(super) fn first_crossing(land: &Land, ray: &Ray, pyramid: bool) -> Option<Cr
             next_j
         };
         t = leave;
-        if level < top && line & ((2 << level) - 1) == 0 {
+        if level < top && line & (1 << level) == 0 {
             level += 1;
         }
     }
@@ -204,6 +204,18 @@ impl Axis {
     fn crossing_or_start(&self, cell: u32) -> f64 {
         if self.still { f64::NEG_INFINITY } else { self.crossing(cell) }
     }
+}
+
+/// The heights at the corners of a patch of the raster; `None` if any is void.
+#[inline(always)]
+fn patch_corners(raster: &Raster, voids: bool, column: usize, row: usize) -> Option<[f32; 4]> {
+    let at = row * raster.columns() + column;
+    let (south, north) = (raster.heights().get(at..at + 2)?, raster.heights().get(at + raster.columns()..)?.get(..2)?);
+    let void = |index| raster.voids().is_void(index);
+    if voids && (void(at) || void(at + 1) || void(at + raster.columns()) || void(at + raster.columns() + 1)) {
+        return None;
+    }
+    Some([south[0], south[1], north[0], north[1]])
 }
 
 /// Corner heights as seen with one or both axes mirrored.

@@ -185,7 +185,8 @@ fn lerc(image: &Image, blob: &[u8], decoded: &mut [u8]) -> Result<usize, String>
     }
     let count = columns * rows * image.interleaved;
 
-    // Out as native numbers; the byte order of the file does not touch LERC.
+    // Out as the bytes of native numbers. In a file of the other byte order libtiff swaps the samples before LERC takes
+    // them for native, so they are swapped once more afterwards, like those of any codec.
     fn typed<T: lerc::Sample + Copy, const N: usize>(
         blob: &[u8],
         count: usize,

@@ -70,9 +70,7 @@ pub(super) fn decode(
         all.resize(columns * rows, f32::NAN);
         let good_rows = scratch.decoded.chunks_exact_mut(row_bytes).take(whole_rows.min(segment.rows));
         for (row, heights) in good_rows.zip(all[here.start * columns..].chunks_exact_mut(columns)) {
-            if !image.compression.is_lerc() {
-                restore_row(row, image.kind.size(), file.little, image.predictor, image.interleaved, row_scratch);
-            }
+            restore_row(row, image.kind.size(), file.little, image.predictor, image.interleaved, row_scratch);
             heights_of_row(row, image.kind, image.interleaved, rule, heights);
             if let Some(alpha) = image.alpha {
                 let size = image.kind.size();

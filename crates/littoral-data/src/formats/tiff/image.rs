@@ -84,7 +84,7 @@ impl Compression {
         }
     }
 
-    /// Whether the codec hands out native numbers rather than bytes of the file's order.
+    /// Whether the codec deals in numbers rather than bytes, and leaves predictors out.
     pub(super) fn is_lerc(self) -> bool {
         matches!(self, Compression::Lerc | Compression::LercDeflate | Compression::LercZstd)
     }

@@ -71,6 +71,11 @@ impl Frame {
         }
     }
 
+    /// Index steps from one sample of a ring to the next.
+    pub fn step(&self) -> usize {
+        if self.eastward { self.columns } else { 1 }
+    }
+
     /// The samples of a ring that belong to this quarter, as a half-open range: diagonals belong to east and west.
     pub fn belonging(&self, ring: i64) -> std::ops::Range<i64> {
         let distance = self.distance(ring);
@@ -109,7 +114,8 @@ pub(super) struct Rings {
     pub low: i64,
     pub stride: usize,
     pub heights: Vec<f32>,
-    /// The same for lower bounds of the ground: [`NOTHING`] at samples that are void on their own or the previous ring.
+    /// The same for lower bounds of the ground: [`NOTHING`] at and beside samples that are void on the same or the
+    /// previous ring.
     /// Empty when the land has no voids.
     pub solid: Vec<f32>,
     /// Greatest height difference to the eye so far (m), and between neighbours along a ring.
@@ -129,7 +135,8 @@ impl Rings {
         self.rings.clear();
         self.rings.extend((0..=count).map(|k| {
             let ring = first - 1 + k;
-            let belonging = frame.belonging(ring);
+            // Only wedges at a diagonal have to share its samples out.
+            let belonging = if t0 > -1.0 && t1 < 1.0 { 0..frame.minors } else { frame.belonging(ring) };
             let (major, distance) = (frame.major(ring), frame.distance(ring));
             Ring { ring, major, distance, belonging: (belonging.start, belonging.end) }
         }));
@@ -147,7 +154,7 @@ impl Rings {
         self.stride = self.stride.next_multiple_of(16) + 16;
         let rows = count as usize + 1;
         self.heights.resize(rows * self.stride, 0.0);
-        self.gather(scene, frame, inside_low, inside_high);
+        self.gather::<V>(scene, frame, inside_low, inside_high);
         for row in 0..rows {
             // SAFETY: the caller vouches for the instructions.
             unsafe { self.relate::<V>(scene, frame, row, inside_low, inside_high) };
@@ -160,7 +167,8 @@ impl Rings {
 
     /// Copies raw heights: rows as they are, columns turned.
     #[inline(always)]
-    fn gather(&mut self, scene: &Scene, frame: &Frame, inside_low: i64, inside_high: i64) {
+    #[allow(clippy::needless_range_loop)]
+    fn gather<V: Lanes>(&mut self, scene: &Scene, frame: &Frame, inside_low: i64, inside_high: i64) {
         let heights = scene.land.raster().heights();
         let columns = scene.land.raster().columns();
         let offset = (inside_low - self.low) as usize;
@@ -175,6 +183,9 @@ impl Rings {
         }
         let count = self.rings.len();
         let first = self.rings[0].major.min(self.rings[count - 1].major) as usize;
+        // Rows lie far apart in memory, where the processor does not foresee them: what the next batch will read is
+        // asked for now.
+        let ahead = if frame.forward { first + count + BATCH - 1 } else { first.saturating_sub(BATCH) };
         // Blocks of 16 rows: every cache line read is used whole, every line written is filled at once.
         let mut block = [[0.0f32; 16]; BATCH + 1];
         for start in (0..length).step_by(16) {
@@ -182,6 +193,7 @@ impl Rings {
             for line in 0..lines {
                 let from = (inside_low as usize + start + line) * columns + first;
                 let source = &heights[from..from + count];
+                V::prefetch(heights.as_ptr().wrapping_add(from - first + ahead));
                 if let Ok(source) = <&[f32; BATCH + 1]>::try_from(source) {
                     for k in 0..=BATCH {
                         block[k][line] = source[k];
@@ -252,10 +264,11 @@ impl Rings {
         for (row, ring) in self.rings.iter().enumerate() {
             for minor in inside_low..=inside_high {
                 if voids.is_void(frame.index(ring.major, minor)) {
+                    // Its neighbours too: a border between two missing patches is no ground.
                     let at = (minor - self.low) as usize;
-                    self.solid[row * self.stride + at] = NOTHING;
-                    if row + 1 < self.rings.len() {
-                        self.solid[(row + 1) * self.stride + at] = NOTHING;
+                    let around = at.saturating_sub(1)..at + 2;
+                    for row in row..(row + 2).min(self.rings.len()) {
+                        self.solid[row * self.stride..][around.clone()].fill(NOTHING);
                     }
                 }
             }

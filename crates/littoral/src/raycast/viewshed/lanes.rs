@@ -32,6 +32,8 @@ pub(super) trait Lanes: Copy {
     fn at_most(self, other: Self) -> u16;
     /// `self` where the mask has a one, else `other`.
     fn select(self, mask: u16, other: Self) -> Self;
+    /// Asks for a cache line that will be read soon; any address will do.
+    fn prefetch(_from: *const f32) {}
     /// The smallest lane.
     fn smallest(self) -> f32;
     /// The greatest lane.
@@ -53,6 +55,8 @@ impl Portable {
     }
 }
 
+// Loops over lanes are what the compiler turns into vectors.
+#[allow(clippy::needless_range_loop)]
 impl Lanes for Portable {
     type Index = [u32; 16];
 
@@ -164,6 +168,10 @@ mod x86 {
     // are entered only after the processor was asked for it.
     #[allow(clippy::undocumented_unsafe_blocks)]
     impl Lanes for Avx512 {
+        #[inline(always)]
+        fn prefetch(from: *const f32) {
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(from.cast()) }
+        }
         type Index = __m512i;
 
         #[inline(always)]
@@ -237,6 +245,10 @@ mod x86 {
 
     #[allow(clippy::undocumented_unsafe_blocks)]
     impl Lanes for Avx2 {
+        #[inline(always)]
+        fn prefetch(from: *const f32) {
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(from.cast()) }
+        }
         type Index = (__m256i, __m256i);
 
         #[inline(always)]
@@ -295,16 +307,7 @@ mod x86 {
         }
         #[inline(always)]
         fn lookup(self, index: Self::Index) -> Self {
-            unsafe {
-                // Bit 3 of an index, moved to the sign, picks the half of the table.
-                let half = |index: __m256i| {
-                    let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index));
-                    let (low, high) =
-                        (_mm256_permutevar8x32_ps(self.0, index), _mm256_permutevar8x32_ps(self.1, index));
-                    _mm256_blendv_ps(low, high, upper)
-                };
-                Avx2(half(index.0), half(index.1))
-            }
+            unsafe { Avx2(lookup_half(self, index.0), lookup_half(self, index.1)) }
         }
         #[inline(always)]
         fn at_most(self, other: Self) -> u16 {
@@ -316,14 +319,7 @@ mod x86 {
         }
         #[inline(always)]
         fn select(self, mask: u16, other: Self) -> Self {
-            unsafe {
-                let half = |bits: u16, yes: __m256, no: __m256| {
-                    let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-                    let set = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(i32::from(bits)), bit), bit);
-                    _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(set))
-                };
-                Avx2(half(mask & 255, self.0, other.0), half(mask >> 8, self.1, other.1))
-            }
+            unsafe { Avx2(select_half(mask & 255, self.0, other.0), select_half(mask >> 8, self.1, other.1)) }
         }
         #[inline(always)]
         fn smallest(self) -> f32 {
@@ -336,6 +332,29 @@ mod x86 {
             let mut lanes = [0.0; 8];
             unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), _mm256_max_ps(self.0, self.1)) };
             lanes.into_iter().fold(f32::NEG_INFINITY, f32::max)
+        }
+    }
+    /// # Safety
+    /// The processor must have AVX2.
+    #[inline(always)]
+    unsafe fn lookup_half(table: Avx2, index: __m256i) -> __m256 {
+        // SAFETY: the caller's. Bit 3 of an index, moved to the sign, picks the half of the table.
+        unsafe {
+            let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(index));
+            let (low, high) = (_mm256_permutevar8x32_ps(table.0, index), _mm256_permutevar8x32_ps(table.1, index));
+            _mm256_blendv_ps(low, high, upper)
+        }
+    }
+
+    /// # Safety
+    /// The processor must have AVX2.
+    #[inline(always)]
+    unsafe fn select_half(bits: u16, yes: __m256, no: __m256) -> __m256 {
+        // SAFETY: the caller's.
+        unsafe {
+            let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(i32::from(bits)), bit), bit);
+            _mm256_blendv_ps(no, yes, _mm256_castsi256_ps(set))
         }
     }
 }

@@ -1,10 +1,12 @@
 //! One wedge of directions, swept outward ring by ring with sixteen bins or samples to an instruction.
 
 use super::frame::{BATCH, Frame, NOTHING, Ring, Rings};
+#[cfg(target_arch = "x86_64")]
+use super::lanes::{Avx2, Avx512};
 use super::lanes::{Lanes, Portable};
 use super::near::{NEAR, near_horizon};
 use super::{Pending, Scene, Seen};
-use crate::raycast::GRAZE;
+use crate::raycast::{GRAZE, Simd};
 
 /// Widest a bin may be, in samples: sixteen of them then need no more than sixteen neighbouring heights.
 const WIDEST: f64 = 0.875;
@@ -83,50 +85,53 @@ impl Bins {
     }
 }
 
+/// What a wedge came to.
+#[derive(Default)]
+pub(super) struct Found {
+    /// How many samples were marked.
+    pub seen: usize,
+    /// Those that the bounds did not decide.
+    pub pending: Vec<Pending>,
+}
+
+/// The upper bounds of sixteen bins before each ring of a batch.
+type History = [([f32; 16], [f32; 16]); BATCH + 1];
+
 /// Finds what is seen between the directions `from` and `to` (minor over major, of one sign): marks what is surely seen
 /// and lists what is undecided. Samples on the near rings are left to the caller.
-pub(super) fn sweep(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Vec<Pending> {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use super::lanes::{Avx2, Avx512};
-        #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
-        fn with_avx512(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Vec<Pending> {
-            // SAFETY: this function is compiled for the instructions of these lanes.
-            unsafe { sweep_with::<Avx512>(scene, frame, from, to, seen) }
-        }
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
-        fn with_avx2(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Vec<Pending> {
-            // SAFETY: this function is compiled for the instructions of these lanes.
-            unsafe { sweep_with::<Avx2>(scene, frame, from, to, seen) }
-        }
-        let avx2 = is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt");
-        let avx512 = avx2
-            && is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl");
-        if avx512 && scene.instructions >= 2 {
-            // SAFETY: the processor was just asked.
-            return unsafe { with_avx512(scene, frame, from, to, seen) };
-        }
-        if avx2 && scene.instructions >= 1 {
-            // SAFETY: the processor was just asked.
-            return unsafe { with_avx2(scene, frame, from, to, seen) };
-        }
+pub(super) fn sweep(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Found {
+    match scene.simd {
+        // SAFETY: `viewshed_with` asked the processor for the instructions.
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx512 => unsafe { with_avx512(scene, frame, from, to, seen) },
+        // SAFETY: likewise.
+        #[cfg(target_arch = "x86_64")]
+        Simd::Avx2 => unsafe { with_avx2(scene, frame, from, to, seen) },
+        // SAFETY: plain arrays need no particular instructions.
+        _ => unsafe { sweep_with::<Portable>(scene, frame, from, to, seen) },
     }
-    // SAFETY: plain arrays need no particular instructions.
-    unsafe { sweep_with::<Portable>(scene, frame, from, to, seen) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn with_avx512(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Found {
+    // SAFETY: this function is compiled for the instructions of these lanes.
+    unsafe { sweep_with::<Avx512>(scene, frame, from, to, seen) }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn with_avx2(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Found {
+    // SAFETY: this function is compiled for the instructions of these lanes.
+    unsafe { sweep_with::<Avx2>(scene, frame, from, to, seen) }
 }
 
 /// # Safety
 /// The processor must have the instructions of `V`.
 #[inline(always)]
-unsafe fn sweep_with<V: Lanes>(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Vec<Pending> {
-    let mut pending = Vec::new();
+unsafe fn sweep_with<V: Lanes>(scene: &Scene, frame: &Frame, from: f64, to: f64, seen: &Seen) -> Found {
+    let mut found = Found::default();
+    let mut history: Box<History> = Box::new([([0.0; 16], [0.0; 16]); BATCH + 1]);
     let mut groups = vec![near_horizon(scene, frame, from, (to - from) / 16.0)];
     let mut rings = Rings::default();
     let mut first = NEAR + 1;
@@ -145,15 +150,15 @@ unsafe fn sweep_with<V: Lanes>(scene: &Scene, frame: &Frame, from: f64, to: f64,
             // SAFETY: the caller vouches for the instructions.
             unsafe {
                 if rings.solid.is_empty() {
-                    cross::<V, false>(scene, frame, &rings, bins, left, step, seen, &mut pending);
+                    cross::<V, false>(scene, frame, &rings, bins, left, step, seen, &mut history, &mut found);
                 } else {
-                    cross::<V, true>(scene, frame, &rings, bins, left, step, seen, &mut pending);
+                    cross::<V, true>(scene, frame, &rings, bins, left, step, seen, &mut history, &mut found);
                 }
             }
         }
         first = last + 1;
     }
-    pending
+    found
 }
 
 const LANE: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
@@ -163,7 +168,8 @@ const LANE: [f32; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0,
 /// # Safety
 /// The processor must have the instructions of `V`.
 #[inline(always)]
-#[allow(clippy::too_many_arguments)]
+// One reason covers the many loads: it stands before the first of them.
+#[allow(clippy::too_many_arguments, clippy::undocumented_unsafe_blocks)]
 unsafe fn cross<V: Lanes, const VOIDS: bool>(
     scene: &Scene,
     frame: &Frame,
@@ -172,25 +178,25 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
     left: f64,
     span: f64,
     seen: &Seen,
-    pending: &mut Vec<Pending>,
+    history: &mut History,
+    found: &mut Found,
 ) {
     // SAFETY: the arrays hold sixteen numbers.
     let table = |values: &[f32; 16]| unsafe { V::load(values.as_ptr()) };
+    // SAFETY: likewise.
+    let save = |values: V, to: &mut [f32; 16]| unsafe { values.store(to.as_mut_ptr()) };
     let lane = table(&LANE);
     let zero = V::splat(0.0);
     let rising = left >= 0.0;
     let width_of_bin = span / 16.0;
-    let aside = {
-        let edge = |offset: f64| V::splat((left + offset) as f32).add(lane.mul(V::splat(width_of_bin as f32))).abs();
-        edge(0.0).max(edge(width_of_bin))
-    };
-    let (start_left, start_right) = (table(&bins.upper_left), table(&bins.upper_right));
-    let (mut upper_left, mut upper_right) = (start_left, start_right);
+    let aside = V::splat(left as f32).add(lane.mul(V::splat(width_of_bin as f32))).abs();
+    let aside = if rising { aside.add(V::splat(width_of_bin as f32)) } else { aside };
+    let (mut upper_left, mut upper_right) = (table(&bins.upper_left), table(&bins.upper_right));
     let (mut lower_left, mut lower_right) = (table(&bins.lower_left), table(&bins.lower_right));
     let (mut last_left, mut last_right) = (table(&bins.last_left), table(&bins.last_right));
     let (mut floor, mut skipped) = (bins.floor, bins.skipped);
     let target_height = scene.target_height as f32;
-    let start_ring = rings.rings[0].ring;
+    let mut noted = 0;
 
     // Rounding, as a height (m): of the heights themselves and what is computed of them (2⁻²⁴ each), and of positions
     // along a ring (3·10⁻⁶ of a sample, times how much neighbours differ); then how far bilinear interpolation of the
@@ -208,9 +214,9 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
         }
         let base = here.floor();
         let offset = (base as i64 - rings.low) as usize;
-        assert!(offset >= 2 && offset + 40 <= rings.stride + 16, "a bin outside its batch of rings");
-        // SAFETY of all loads below: they begin at most 4 after `offset` (targets: 16 after) and read 16 numbers; the row
-        // holds them by the assertion, and the last row is followed by what `fetch` adds.
+        assert!(offset >= 2 && offset + 40 <= rings.stride, "a bin outside its batch of rings");
+        // SAFETY of all loads below: they begin 2 before to 17 after `offset` and read 16 numbers: the assertion keeps them
+        // within the row.
         let far = unsafe { rings.heights.as_ptr().add(row * rings.stride + offset) };
         let near = unsafe { rings.heights.as_ptr().add((row - 1) * rings.stride + offset) };
 
@@ -229,6 +235,11 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
             (last_left, last_right) = (V::splat(floor), V::splat(floor));
             skipped = false;
         }
+        for (left, right) in &mut history[noted + 1..=row] {
+            save(upper_left, left);
+            save(upper_right, right);
+        }
+        noted = row;
         let inverse = V::splat(1.0 / distance);
         let width = width_of_bin * ring.distance;
         let inverse_width = V::splat((1.0 / width) as f32);
@@ -252,13 +263,8 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
             let (bin, whole) = place.whole();
             let within = place.sub(whole);
             let margin = V::splat(rounding).mul(inverse);
-            let line = |left: V, right: V| {
-                let (left, right) = (left.lookup(bin), right.lookup(bin));
-                let rise = right.sub(left);
-                (left.add(rise.mul(within)), rise.abs().mul(V::splat(1e-5)).add(margin))
-            };
-            let (upper, upper_margin) = line(upper_left, upper_right);
-            let (lower, lower_margin) = line(lower_left, lower_right);
+            let (upper, upper_margin) = chord(upper_left, upper_right, bin, within, margin);
+            let (lower, lower_margin) = chord(lower_left, lower_right, bin, within, margin);
             let above = upper.add(upper_margin).at_most(slope);
             let below = slope.add(lower_margin).at_most(lower);
 
@@ -294,22 +300,31 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
             };
 
             let visible = asked & above & free;
+            found.seen += visible.count_ones() as usize;
+            let (first, step) = (frame.index(ring.major, from), frame.step());
             let mut bits = visible;
             while bits != 0 {
-                let minor = from + i64::from(bits.trailing_zeros());
                 // SAFETY: the sample belongs to this wedge only.
-                unsafe { seen.mark(frame.index(ring.major, minor)) };
+                unsafe { seen.mark(first + step * bits.trailing_zeros() as usize) };
                 bits &= bits - 1;
             }
-            let mut bits = asked & !visible & !below & !blocked;
-            if bits != 0 {
-                // Above the horizon as it stood when the batch began: only the strips since then are in question.
-                let (upper, upper_margin) = line(start_left, start_right);
-                let recent = upper.add(upper_margin).at_most(slope);
+            // Samples in doubt: above the horizon of how many rings ago? Only the strips since then are in question.
+            let mut doubtful = asked & !visible & !below & !blocked;
+            let mut back = row;
+            while doubtful != 0 {
+                let (clear, since) = if back == 0 {
+                    (doubtful, 0)
+                } else {
+                    let (left, right) = (table(&history[back].0), table(&history[back].1));
+                    let (upper, upper_margin) = chord(left, right, bin, within, margin);
+                    (doubtful & upper.add(upper_margin).at_most(slope), rings.rings[back - 1].ring)
+                };
+                doubtful &= !clear;
+                back = back.saturating_sub(1);
+                let mut bits = clear;
                 while bits != 0 {
-                    let k = bits.trailing_zeros();
-                    let since = if recent >> k & 1 == 1 { start_ring } else { 0 };
-                    pending.push(Pending { ring: ring.ring, minor: from + i64::from(k), since });
+                    let minor = from + i64::from(bits.trailing_zeros());
+                    found.pending.push(Pending { ring: ring.ring, minor, since });
                     bits &= bits - 1;
                 }
             }
@@ -323,41 +338,31 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
         let (i_right, whole) = y.whole();
         let f_right = y.sub(whole);
         let (h0, h1) = unsafe { (V::load(far), V::load(far.add(1))) };
-        let edge = |h0: V, h1: V, index: V::Index, f: V| {
-            let (a, b) = (h0.lookup(index), h1.lookup(index));
-            let step = b.sub(a);
-            (a.add(step.mul(f)), step)
-        };
-        let (h_left, step_left) = edge(h0, h1, i_left, f_left);
-        let (h_right, step_right) = edge(h0, h1, i_right, f_right);
+        let (h_left, step_left) = along(h0, h1, i_left, f_left);
+        let (h_right, step_right) = along(h0, h1, i_right, f_right);
         // A sample within the bin: the ground there stands above (or below) the chord by so much.
         let vertex = V::splat(1.0).sub(f_left).mul(f_right).mul(inverse_width);
         let tent = step_left.sub(step_right).mul(vertex);
 
         let bulge = unsafe {
             let (steep, flat) = if rising { (near.sub(1), far.sub(1)) } else { (far, near) };
-            let step = |row: *const f32, k: usize| V::load(row.add(k + 1)).sub(V::load(row.add(k)));
-            let steepest = step(steep, 0).max(step(steep, 1)).max(step(steep, 2));
-            let flattest = step(flat, 0).min(step(flat, 1)).min(step(flat, 2));
+            let ([s0, s1, s2], [f0, f1, f2]) = (steps::<V>(steep), steps::<V>(flat));
+            let (steepest, flattest) = (s0.max(s1).max(s2), f0.min(f1).min(f2));
             let twist = steepest.sub(flattest).lookup(i_left);
             aside.mul(twist).max(zero).add(V::splat(4.0 * rounding + 1e-9))
         };
         let per_bulge = V::splat(0.25 / before).div(bulge);
+        let before = V::splat(before);
         let lift = tent.max(zero).add(V::splat(rounding - graze));
-        let raise = |upper: V, last: V, height: V| {
-            let now = height.add(lift).mul(inverse);
-            let rest = bulge.sub(now.sub(last).abs().mul(V::splat(before))).max(zero);
-            let excess = rest.mul(rest).mul(per_bulge);
-            (upper.max(now.max(last).add(excess)), now)
-        };
-        (upper_left, last_left) = raise(upper_left, last_left, h_left);
-        (upper_right, last_right) = raise(upper_right, last_right, h_right);
+        (upper_left, last_left) = raise(upper_left, last_left, h_left.add(lift).mul(inverse), bulge, per_bulge, before);
+        (upper_right, last_right) =
+            raise(upper_right, last_right, h_right.add(lift).mul(inverse), bulge, per_bulge, before);
 
         let (h_left, h_right, tent) = if VOIDS {
             let solid = unsafe { rings.solid.as_ptr().add(row * rings.stride + offset) };
             let (h0, h1) = unsafe { (V::load(solid), V::load(solid.add(1))) };
-            let (h_left, step_left) = edge(h0, h1, i_left, f_left);
-            let (h_right, step_right) = edge(h0, h1, i_right, f_right);
+            let (h_left, step_left) = along(h0, h1, i_left, f_left);
+            let (h_right, step_right) = along(h0, h1, i_right, f_right);
             (h_left, h_right, step_left.sub(step_right).mul(vertex))
         } else {
             (h_left, h_right, tent)
@@ -372,7 +377,6 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
         }
     }
 
-    let save = |values: V, to: &mut [f32; 16]| unsafe { values.store(to.as_mut_ptr()) };
     save(upper_left, &mut bins.upper_left);
     save(upper_right, &mut bins.upper_right);
     save(lower_left, &mut bins.lower_left);
@@ -380,4 +384,40 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
     save(last_left, &mut bins.last_left);
     save(last_right, &mut bins.last_right);
     (bins.floor, bins.skipped) = (floor, skipped);
+}
+
+/// A line over bins at a place within them, and how far rounding may have moved it.
+#[inline(always)]
+fn chord<V: Lanes>(left: V, right: V, bin: V::Index, within: V, margin: V) -> (V, V) {
+    let (left, right) = (left.lookup(bin), right.lookup(bin));
+    let rise = right.sub(left);
+    (left.add(rise.mul(within)), rise.abs().mul(V::splat(1e-5)).add(margin))
+}
+
+/// Heights between samples, and the steps from one sample to the next there.
+#[inline(always)]
+fn along<V: Lanes>(here: V, next: V, index: V::Index, within: V) -> (V, V) {
+    let (a, b) = (here.lookup(index), next.lookup(index));
+    let step = b.sub(a);
+    (a.add(step.mul(within)), step)
+}
+
+/// The steps from each of eighteen samples to the next: sixteen from the first, from the second, from the third on.
+///
+/// # Safety
+/// Nineteen numbers must be readable at `row`.
+#[inline(always)]
+unsafe fn steps<V: Lanes>(row: *const f32) -> [V; 3] {
+    // SAFETY: the caller's.
+    let [a, b, c, d] = unsafe { [V::load(row), V::load(row.add(1)), V::load(row.add(2)), V::load(row.add(3))] };
+    [b.sub(a), c.sub(b), d.sub(c)]
+}
+
+/// The upper bound of one edge after a strip that begins at slope `last` and ends at slope `now`, and `now`. Between the
+/// two, `before` samples or more away from the eye, the ground may stand above its chord by `bulge`·u(1 − u).
+#[inline(always)]
+fn raise<V: Lanes>(upper: V, last: V, now: V, bulge: V, per_bulge: V, before: V) -> (V, V) {
+    let rest = bulge.sub(now.sub(last).abs().mul(before)).max(V::splat(0.0));
+    let excess = rest.mul(rest).mul(per_bulge);
+    (upper.max(now.max(last).add(excess)), now)
 }
