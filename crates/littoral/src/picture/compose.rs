@@ -115,7 +115,7 @@ impl Camera {
 
 /// Eyes over a lattice of places within the land (and around it, where that is sea), at several heights.
 fn candidates(land: &Land, water: Option<&Water>, standing: bool) -> Vec<Camera> {
-    const PLACES: i32 = 7;
+    const PLACES: i32 = 8;
     const BEARINGS: usize = 12;
     let extent = land.extent();
     let reach = extent.min_element();
@@ -229,13 +229,13 @@ fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -
     let shape =
         (skyline.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / skyline.len() as f64).sqrt() / f64::from(size.y);
     let within = |value: f64, best: f64, width: f64| (-((value - best) / width).powi(2)).exp();
-    1.6 * (contrast / 0.22).min(1.4)
-        + 0.9 * (layers / 0.7).min(1.2)
+    1.5 * (contrast / 0.22).min(1.2)
+        + 1.5 * (layers / 0.7).min(1.2)
         + 0.7 * (shape / 0.10).min(1.0)
         + 1.0 * within(sky, 0.27, 0.16)
         + if water.is_some() { 0.8 * within(wet, 0.28, 0.20) } else { 0.0 }
         + 0.8 * land_share.min(0.5)
         - 5.0 * missing
         - 3.0 * (0.12 - land_share).max(0.0) / 0.12
-        - 1.5 * (1.0 - nearest / (0.10 * extent)).max(0.0)
+        - 1.5 * (1.0 - nearest / (0.13 * extent)).max(0.0)
 }

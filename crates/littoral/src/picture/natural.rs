@@ -40,20 +40,24 @@ const ROOF_SLATE: Vec3 = Vec3::new(0.115, 0.112, 0.115);
 const PLASTER: Vec3 = Vec3::new(0.480, 0.445, 0.390);
 const SEAGRASS: Vec3 = Vec3::new(0.030, 0.042, 0.022);
 
-/// What kind of ground lies at `at` (m) on `surface`, which is `broad`ly so over some tens of metres.
-///
-/// `spacing` is the distance between samples (m), `footprint` the width of a pixel on the ground (m) and `water` the level of
-/// the water nearby (m), if any; `standing` is the height of trees and houses that the samples include (m).
-pub fn natural(
-    at: DVec3,
-    surface: &Surface,
-    broad: &Surface,
-    spacing: f32,
-    footprint: f32,
-    water: Option<f32>,
-    climate: &Climate,
-    standing: f32,
-) -> Material {
+/// A place on the ground, and how it is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// Where (m).
+    pub at: DVec3,
+    /// Distance between samples there (m).
+    pub spacing: f32,
+    /// Width of a pixel on the ground (m).
+    pub footprint: f32,
+    /// Level of the water nearby (m), if any.
+    pub water: Option<f32>,
+    /// Height of trees and houses that the samples include (m).
+    pub standing: f32,
+}
+
+/// What kind of ground lies at `site` on `surface`, which is `broad`ly so over some tens of metres.
+pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climate) -> Material {
+    let Site { at, spacing, footprint, water, standing } = *site;
     let normal = Vec3::new(-surface.slope.x, -surface.slope.y, 1.0).normalize();
     let steep = surface.slope.length();
     // Wide samples smooth cliffs away: what is left of their slope counts for more.
@@ -117,7 +121,7 @@ pub fn natural(
     }
 
     if standing > 1.0 {
-        return stands(at, surface, spacing, footprint, standing, albedo, normal);
+        return stands(site, surface, albedo, normal);
     }
 
     // Bare ground: high, steep or washed by the sea.
@@ -183,15 +187,8 @@ pub fn natural(
 }
 
 /// What stands on the ground: trees where the surface is rough, houses where it is even.
-fn stands(
-    at: DVec3,
-    surface: &Surface,
-    spacing: f32,
-    footprint: f32,
-    standing: f32,
-    ground: Vec3,
-    normal: Vec3,
-) -> Material {
+fn stands(site: &Site, surface: &Surface, ground: Vec3, normal: Vec3) -> Material {
+    let Site { at, spacing, footprint, standing, .. } = *site;
     let rough = step(0.10, 0.32, surface.hollow.abs() * spacing + 0.10 * (surface.slope.length() - 1.0).max(0.0))
         * (1.0 - step(24.0, 34.0, standing));
     let plain = DVec3::new(at.x, at.y, 0.0);

@@ -5,7 +5,7 @@ use super::atmosphere::Veil;
 use super::cartography::relief;
 use super::grain::step;
 use super::ground::Surface;
-use super::natural::{Material, natural};
+use super::natural::{Material, Site, natural};
 use super::sampler::Sampler;
 use super::sea::{Ripples, fresnel, glitter, refract, ripples};
 use super::skylight::irradiance;
@@ -258,7 +258,8 @@ impl Stage<'_> {
         let water = self.scene.water.filter(|w| w.covers(at) || position.z < w.level + 15.0);
         let level = water.map(|w| w.level as f32);
         let broad = self.ground.surface(at, (4.0 * spacing).max(footprint));
-        natural(position, surface, &broad, spacing, footprint, level, &self.scene.climate, self.ground.standing(at))
+        let site = Site { at: position, spacing, footprint, water: level, standing: self.ground.standing(at) };
+        natural(&site, surface, &broad, &self.scene.climate)
     }
 
     #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]

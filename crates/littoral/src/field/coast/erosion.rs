@@ -110,7 +110,7 @@ impl Carving {
 
     /// Where each place drains to, and how far that is; itself for the sea and for hollows.
     fn receivers(&self, receiver: &mut [u32], run: &mut [f32]) {
-        for i in 0..self.heights.len() {
+        for (i, receiver) in receiver.iter_mut().enumerate() {
             let (mut best, mut steepest) = (i, 0.0);
             if self.heights[i] > 0.0 {
                 for (j, distance) in neighbours(i, self.side) {
@@ -121,7 +121,7 @@ impl Carving {
                     }
                 }
             }
-            receiver[i] = best as u32;
+            *receiver = best as u32;
         }
     }
 
