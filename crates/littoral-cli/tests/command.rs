@@ -437,19 +437,7 @@ fn an_interrupted_film_leaves_no_half_written_file() {
     let desk = Desk::new();
     let out = desk.path("film.mp4");
     let mut child = Command::new(env!("CARGO_BIN_EXE_littoral"))
-        .args([
-            "render",
-            &desk.land,
-            "--path",
-            "--seconds",
-            "3000",
-            "--size",
-            "64x36",
-            "--samples",
-            "1",
-            "--out",
-            &out,
-        ])
+        .args(["render", &desk.land, "--path", "--seconds", "3000", "--size", "64x36", "--samples", "1", "--out", &out])
         .stderr(Stdio::null())
         .stdout(Stdio::null())
         .spawn()
