@@ -305,6 +305,32 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn bulk_heights_and_sights_equal_single_ones(land in any_land(), k in prop::collection::vec(any::<[u32; 6]>(), 1..150)) {
+        let anchor = DVec3::new(-10.0, 10.0, 3.0);
+        let rays: Vec<Ray> = k.iter().map(|k| ray_at(&land, 1, k.map(|k| f64::from(k) / 4_294_967_296.0))).collect();
+        let places: Vec<DVec2> = rays.iter().map(|ray| ray.origin.truncate()).collect();
+        let mut heights = vec![0.0; places.len()];
+        land.heights_at(&places, &mut heights);
+        for (place, height) in places.iter().zip(heights) {
+            let single = land.height_at(*place).unwrap_or(f32::NAN);
+            prop_assert_eq!(single.to_bits(), height.to_bits(), "{} is not {} at {}", height, single, place);
+        }
+        let segments: Vec<_> = rays.iter().map(|ray| [0.0, 1.0].map(|t| (ray.at(t) - anchor).as_vec3())).collect();
+        let locals: Vec<_> = segments.iter().map(|[from, to]| LocalRay::between(*from, *to)).collect();
+        for simd in [Simd::Portable, Simd::Avx2, Simd::Avx512].into_iter().filter(|simd| simd.available()) {
+            let caster = land.caster(anchor).with_simd(simd);
+            let (mut visible, mut hits) = (vec![false; segments.len()], vec![false; segments.len()]);
+            caster.lines_of_sight(&segments, &mut visible);
+            caster.par_any_hits(&locals, &mut hits);
+            prop_assert!(visible.iter().zip(&hits).all(|(visible, hit)| visible != hit));
+        }
+    }
+}
+
 #[test]
 fn nonsense_meets_nothing() {
     let land = land(3, 17, 9, DVec2::ONE, Ground::Steep, 0);

@@ -240,6 +240,7 @@ struct Stream<'a, T> {
 
 impl<T: Copy> Rays for Stream<'_, T> {
     const REFILL: u32 = 12;
+    const RISE: i32 = 1;
 
     #[inline(always)]
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {

@@ -252,6 +252,7 @@ fn node<L: Lanes>(l: L, scene: &Scene, axis: usize, cell: L::I, level: L::I) -> 
 
 impl Rays for ViewRays<'_> {
     const REFILL: u32 = 16;
+    const RISE: i32 = 3;
 
     #[inline(always)]
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {

@@ -189,6 +189,10 @@ pub(super) trait Rays {
     /// Lanes that must have ended before lanes are refilled, in sixteenths of all: neighbours end together and are best
     /// replaced together, strangers sooner.
     const REFILL: u32;
+    /// Which lines lead to the coarser level, as bits of the line's number at the walk's level that must be 0: 1 for every
+    /// line that ends a coarser node, 3 for every other one, better for rays that start near what they hit. All walks of
+    /// one kind of rays must share it, since a ray that just touches the rim of a hole may be answered either way.
+    const RISE: i32;
 
     /// Overwrites `block` with the next rays; `count` = 0 when there are none left.
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared);
@@ -346,7 +350,7 @@ impl<L: Lanes> Packet<L> {
 
     /// One step of every lane: into, or past, a node or a patch.
     #[inline(always)]
-    fn step<const SHEET: bool, const ANY: bool>(&mut self, l: L, scene: &Scene) {
+    fn step<const SHEET: bool, const ANY: bool>(&mut self, l: L, scene: &Scene, rise: i32) {
         let (zero, one) = (l.int(0), l.int(1));
         let lines_x = Lines { base: self.base_x, origin: self.x, inverse: self.inverse_x };
         let lines_y = Lines { base: self.base_y, origin: self.y, inverse: self.inverse_y };
@@ -477,9 +481,8 @@ impl<L: Lanes> Packet<L> {
         self.cell_y = l.iselect(advance, l.iselect(x_first, follow_y, next_y), self.cell_y);
         self.t = l.select(advance, leave, self.t);
 
-        // A level up where the line ends the coarser node as well (where nearest hits are sought, the next coarser one too:
-        // they are mostly near by), down into nodes that are in the way.
-        let ends = l.ieq(l.iand(line, l.shl(l.int(if ANY { 1 } else { 3 }), self.level)), zero);
+        // A level up where the line ends the coarser node as well, down into nodes that are in the way.
+        let ends = l.ieq(l.iand(line, l.shl(l.int(rise), self.level)), zero);
         let up = l.and(l.and(advance, ends), l.igt(l.int(scene.top), self.level));
         let finished = l.or(hit, l.and(advance, l.le(self.end, leave)));
         let mut level = l.iselect(up, l.iadd(self.level, one), self.level);
@@ -542,7 +545,7 @@ pub(super) fn run<L: Lanes, R: Rays, const SHEET: bool, const ANY: bool>(l: L, s
         let mut busy = false;
         for packet in &mut packets {
             busy |= packet.turn_over(l, scene, rays, &mut block, &mut cursor);
-            packet.step::<SHEET, ANY>(l, scene);
+            packet.step::<SHEET, ANY>(l, scene, R::RISE);
         }
         if !busy {
             break;
