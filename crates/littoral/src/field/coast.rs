@@ -1,6 +1,6 @@
 //! The built-in coast: an invented headland with cliffs, a bay with a beach, hills behind, sea bed in front.
 //!
-//! The outline is drawn by hand and bent by noise; rivers carve the hills behind it ([`erosion`]); waves cut cliffs where
+//! The outline is drawn by hand and bent by noise; rivers carve the hills behind it (stream power); waves cut cliffs where
 //! the shore lies open and build a beach where the bay shelters it; the bed falls off as beaches do (R. Dean,
 //! "Equilibrium beach profiles", 1991: depth grows with distance to the power ⅔). Equal bits on every run.
 
