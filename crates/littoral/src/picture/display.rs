@@ -131,7 +131,7 @@ fn film(light: Vec3, contrast: f32, colour: f32) -> Vec3 {
         0.078_433_6,
         0.079_223_745,
         0.079_166_13,
-        0.879_142_97,
+        0.879_143,
     ]);
     const OUTSET: Mat3 = Mat3::from_cols_array(&[
         1.196_879,

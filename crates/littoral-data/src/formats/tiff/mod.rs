@@ -5,10 +5,10 @@
 //! the bytes of a chunk whose codec it does not know (LZMA, LERC), refuses sparse chunks and the number types of mixed
 //! overviews, and reports damage in its own words and only when a chunk is read. The codecs are all crates.
 //!
-//! - [`directory`]: header and tags, every count held against the file's length.
-//! - [`image`]: one image's layout, checked once.
-//! - [`codec`], [`samples`], [`heights`]: from a chunk's bytes to heights.
-//! - [`geokeys`]: where it lies.
+//! - `directory`: header and tags, every count held against the file's length.
+//! - `image`: one image's layout, checked once.
+//! - `codec`, `samples`, `heights`: from a chunk's bytes to heights.
+//! - `geokeys`: where it lies.
 //!
 //! A chunk that is missing or broken is void, and one warning counts them.
 

@@ -74,8 +74,8 @@ impl Carving {
                 first[i + 1] += first[i];
             }
             let mut place = first.clone();
-            for i in 0..count {
-                let r = receiver[i] as usize;
+            for (i, &r) in receiver.iter().enumerate().take(count) {
+                let r = r as usize;
                 if r != i {
                     donors[place[r] as usize] = i as u32;
                     place[r] += 1;
