@@ -360,6 +360,8 @@ impl Render {
         let (land, water) = (&subject.land, subject.water.as_ref());
         let chosen = match built_in {
             true => picture::coast_shot(self.size),
+            // A shaded relief is a map.
+            false if self.style == Some(StyleName::Relief) => picture::overhead(land, water, self.size),
             false => picture::compose(land, water, self.size),
         };
         let own_field = 2.0 * (0.5 * f64::from(self.size.y) / f64::from(chosen.view.pixels_per_radian)).atan();

@@ -169,9 +169,14 @@ impl Projector {
             }
         };
         let proj = |words: &str| proj4rs::Proj::from_proj_string(words);
-        // Grids of datum shifts are files of their own; without them the shift is left out.
-        let kept: Vec<&str> = words.split_whitespace().filter(|word| !word.starts_with("+nadgrids")).collect();
-        let map = proj(words).or_else(|_| proj(&kept.join(" ")));
+        // Grids of datum shifts are files of their own. Without them NAD27 is shifted by the mean of the contiguous United
+        // States (−8, 160, 176 m, good to about 10 m there: NIMA TR8350.2, 2000, appendix B); other grids are left out.
+        let kept = words.split_whitespace().filter(|word| !word.starts_with("+nadgrids")).map(|word| match word {
+            "+datum=NAD27" => "+ellps=clrk66 +towgs84=-8,160,176",
+            word => word,
+        });
+        let kept: Vec<&str> = kept.collect();
+        let map = proj(&kept.join(" "));
         let map = map.map_err(|error| format!("expected a projection that can be computed, got {name} ({error})"))?;
         let degrees = proj("+proj=longlat +datum=WGS84 +no_defs").map_err(|error| error.to_string())?;
         Ok(Projector { degrees, map, name: name.clone() })
@@ -214,6 +219,17 @@ mod tests {
 
     /// Texts as `gdalsrsinfo` writes them, and what `gdaltransform` (PROJ 9.1) makes of a place in each
     /// (for Washington from EPSG:4152, since its shift from WGS84 is not in PROJ strings).
+    #[test]
+    fn nad27_is_shifted_without_a_grid() {
+        // The summit of Mount St. Helens: 46.1912° N, 122.1956° W on WGS84; UTM 10 N on NAD27 about 562.2 km, 5 115.4 km.
+        let projector = Projector::new(&Crs::from_epsg(26710).expect("known")).expect("computable");
+        let at = projector.forward(glam::DVec2::new(-122.1956, 46.1912)).expect("computable");
+        let nad83 = Projector::new(&Crs::from_epsg(26910).expect("known")).expect("computable");
+        let shift = nad83.forward(glam::DVec2::new(-122.1956, 46.1912)).expect("computable") - at;
+        // Between the two systems UTM coordinates differ by about (−94, +202) m there.
+        assert!((shift - glam::DVec2::new(-94.0, 202.0)).length() < 15.0, "{shift}");
+    }
+
     const WASHINGTON_OGC: &str = r#"PROJCS["NAD83(HARN) / Washington South (ftUS)",GEOGCS["NAD83(HARN)",DATUM["NAD83_High_Accuracy_Reference_Network",SPHEROID["GRS 1980",6378137,298.257222101,AUTHORITY["EPSG","7019"]],AUTHORITY["EPSG","6152"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],UNIT["degree",0.0174532925199433,AUTHORITY["EPSG","9122"]],AUTHORITY["EPSG","4152"]],PROJECTION["Lambert_Conformal_Conic_2SP"],PARAMETER["latitude_of_origin",45.3333333333333],PARAMETER["central_meridian",-120.5],PARAMETER["standard_parallel_1",47.3333333333333],PARAMETER["standard_parallel_2",45.8333333333333],PARAMETER["false_easting",1640416.667],PARAMETER["false_northing",0],UNIT["US survey foot",0.304800609601219,AUTHORITY["EPSG","9003"]],AXIS["Easting",EAST],AXIS["Northing",NORTH],AUTHORITY["EPSG","2927"]]"#;
     const WASHINGTON_ESRI: &str = r#"PROJCS["NAD_1983_HARN_StatePlane_Washington_South_FIPS_4602_Feet",GEOGCS["GCS_North_American_1983_HARN",DATUM["D_North_American_1983_HARN",SPHEROID["GRS_1980",6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Lambert_Conformal_Conic"],PARAMETER["False_Easting",1640416.667],PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",-120.5],PARAMETER["Standard_Parallel_1",47.3333333333333],PARAMETER["Standard_Parallel_2",45.8333333333333],PARAMETER["Latitude_Of_Origin",45.3333333333333],UNIT["US survey foot",0.304800609601219]]"#;
     const EUROPE_WKT2: &str = r#"PROJCRS["ETRS89-extended / LAEA Europe",BASEGEOGCRS["ETRS89",ENSEMBLE["European Terrestrial Reference System 1989 ensemble",MEMBER["European Terrestrial Reference Frame 1989"],ELLIPSOID["GRS 1980",6378137,298.257222101,LENGTHUNIT["metre",1]],ENSEMBLEACCURACY[0.1]],PRIMEM["Greenwich",0,ANGLEUNIT["degree",0.0174532925199433]],ID["EPSG",4258]],CONVERSION["Europe Equal Area 2001",METHOD["Lambert Azimuthal Equal Area",ID["EPSG",9820]],PARAMETER["Latitude of natural origin",52,ANGLEUNIT["degree",0.0174532925199433]],PARAMETER["Longitude of natural origin",10,ANGLEUNIT["degree",0.0174532925199433]],PARAMETER["False easting",4321000,LENGTHUNIT["metre",1]],PARAMETER["False northing",3210000,LENGTHUNIT["metre",1]]],CS[Cartesian,2],AXIS["northing (Y)",north,ORDER[1],LENGTHUNIT["metre",1]],AXIS["easting (X)",east,ORDER[2],LENGTHUNIT["metre",1]]]"#;

@@ -4,6 +4,21 @@
 //! ([`Info`]), which resolutions it holds, and windows of heights from it. [`load`] goes all the way to a
 //! [`littoral::field::Raster`] with a [`Georeference`], at a resolution that fits the memory asked for.
 //!
+//! ```no_run
+//! use littoral::{field::Land, picture, picture::{Scene, Settings, Water}, space::Ray};
+//! use littoral_data::{LoadOptions, load};
+//!
+//! let dem = load("dem.tif".as_ref(), LoadOptions { most_samples: 4 << 20 })?;
+//! let land = Land::new(dem.raster);
+//! let height = land.height_at((250.0, -80.0).into()); // metres, None where void
+//! let hit = land.first_hit(&Ray::between((0.0, 0.0, 5e3).into(), (900.0, 0.0, 0.0).into()));
+//! let sea = Water::flood(&land, 0.0);
+//! let shot = picture::compose(&land, sea.as_ref(), (1280, 720).into());
+//! let scene = Scene::for_shot(&land, sea.as_ref(), &shot);
+//! let picture = picture::render(&scene, &shot.view, &Settings::default(), &|_| {});
+//! # Ok::<(), littoral_data::Error>(())
+//! ```
+//!
 //! Rules that hold for every reader:
 //!
 //! - A void is told from a height once, here: declared no-data, NaN and infinities, well-known sentinels, and heights
