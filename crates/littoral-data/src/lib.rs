@@ -33,6 +33,7 @@ mod error;
 pub mod formats;
 mod georeference;
 mod image;
+mod mosaic;
 pub mod path;
 mod reduce;
 mod source;
@@ -45,6 +46,7 @@ pub use crate::image::{BEHIND, Image, image_from, open_image};
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};
 pub use error::Error;
 pub use georeference::{Georeference, Registration, metres_per_degree};
+pub use mosaic::{Mosaic, name_of_all, open_all};
 pub use source::{
     Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, load_from, load_window, open,
 };
