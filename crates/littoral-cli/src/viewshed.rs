@@ -92,16 +92,11 @@ impl Viewshed {
             }
         }
         // Into the file's order, and the whole file's size.
-        let [flip_columns, flip_rows] = info.georeference.flips();
+        info.georeference.turn(&mut seen, window.columns);
         let mut grid = vec![0; columns * rows];
-        for row in 0..window.rows {
-            let line = if flip_rows { window.rows - 1 - row } else { row };
+        for (row, line) in seen.chunks_exact(window.columns).enumerate() {
             let into = (window.row + row) * columns + window.column;
-            let into = &mut grid[into..into + window.columns];
-            into.copy_from_slice(&seen[line * window.columns..(line + 1) * window.columns]);
-            if flip_columns {
-                into.reverse();
-            }
+            grid[into..into + window.columns].copy_from_slice(line);
         }
         let void = raster.voids().count();
         let note = format!(

@@ -258,16 +258,7 @@ fn finish(source: &dyn Source, file: &Path, georeference: Georeference, mut heig
         return Err(Error::content(file, "expected at least one valid height, got only voids"));
     }
     let [columns, rows] = georeference.size;
-    let [flip_columns, flip_rows] = georeference.flips();
-    if flip_rows {
-        for row in 0..rows / 2 {
-            let (upper, lower) = heights.split_at_mut((rows - 1 - row) * columns);
-            upper[row * columns..(row + 1) * columns].swap_with_slice(&mut lower[..columns]);
-        }
-    }
-    if flip_columns {
-        heights.chunks_exact_mut(columns).for_each(<[f32]>::reverse);
-    }
+    georeference.turn(&mut heights, columns);
     info.warnings.extend(georeference.warnings());
     let raster = Raster::new(columns, rows, georeference.spacing(), heights)
         .map_err(|error| Error::content(file, error.to_string()))?;

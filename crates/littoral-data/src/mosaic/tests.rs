@@ -107,7 +107,7 @@ fn a_turned_or_flipped_file_is_laid_the_same_way() {
 #[test]
 fn a_step_between_overlapping_files_is_spread_over_the_overlap() {
     // Up to half a file's width the share of a file runs straight from border to border; beyond, it bends.
-    for (overlap, steepest) in [(1, 20.0), (2, 20.0), (20, 2.0), (30, 1.34), (50, 1.7)] {
+    for (overlap, steepest) in [(1, 20.0), (2, 20.0), (20, 2.0), (30, 1.34), (50, 1.85)] {
         let low = tile([500_000.0, 5_000_000.0], 10.0, [60, 20], |_| 100.0);
         let high = tile([500_600.0 - 10.0 * overlap as f64, 5_000_000.0], 10.0, [60, 20], |_| 140.0);
         let mut mosaic = joined(vec![low, high]);
