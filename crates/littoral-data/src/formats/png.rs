@@ -3,8 +3,7 @@
 //! pictures, and programs write zero, the sea, as transparent. Pixels of an alpha channel that is empty are void.
 
 use super::tiles::{self, TRANSPARENT};
-use super::{Input, georeference_beside, info};
-use crate::voids::VoidRule;
+use super::{Input, georeference_beside, info, pam::Notes};
 use crate::{Error, MemorySource, Source};
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
@@ -29,17 +28,21 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
     let mut info = info("PNG", columns, rows);
     info.georeference = georeference_beside(&input, columns, rows, &["pgw", "pngw", "wld"]);
     info.warnings = pixels.warnings;
+    let notes = Notes::beside(&input);
+    info.warnings.extend(notes.warnings);
     match pixels.values {
         Values::Grey { values, bits } => {
-            info.step = 1.0;
+            info.vertical_metres = notes.band.metres(&mut info.warnings).unwrap_or(1.0);
+            // Alpha was turned into NaN; no value of 0 … 65 535 is a sentinel.
+            let rule = notes.band.rule(info.vertical_metres);
+            info.nodata = rule.nodata;
+            info.step = (rule.scale * rule.metres).abs();
             info.warnings.push(match bits {
                 16 => "grey values of a PNG are taken as metres".into(),
                 bits => format!(
                     "grey values of a PNG are taken as metres: with {bits} bits a sample, land comes in steps of 1 m"
                 ),
             });
-            // Alpha was turned into NaN; no value of 0 … 65 535 is a sentinel.
-            let rule = VoidRule::default();
             let heights = values.into_iter().map(|v| rule.height(f64::from(v))).collect();
             Ok(Box::new(MemorySource::new(info, heights)))
         }

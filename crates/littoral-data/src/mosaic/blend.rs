@@ -2,6 +2,7 @@
 
 use super::tile::Patch;
 use littoral::field::Window;
+use rayon::prelude::*;
 
 /// A part of the lattice on which patches are laid.
 pub(super) struct Blend {
@@ -27,23 +28,21 @@ impl Blend {
     pub(super) fn add(&mut self, patch: &Patch) {
         let fade = fade(&patch.heights, patch.window.columns, self.margin);
         let Window { column, row, columns, rows } = patch.window;
-        for r in 0..rows {
-            let into = (row + r - self.window.row) * self.window.columns + column - self.window.column;
-            for c in 0..columns {
-                let height = patch.heights[r * columns + c];
-                if height.is_nan() {
-                    continue;
-                }
+        let (all, left, top) = (self.window.columns, column - self.window.column, row - self.window.row);
+        let lines = self.base.par_chunks_exact_mut(all).zip(self.sums.par_chunks_exact_mut(all));
+        lines.skip(top).take(rows).enumerate().for_each(|(r, (bases, sums))| {
+            let own = &patch.heights[r * columns..(r + 1) * columns];
+            for (c, &height) in own.iter().enumerate().filter(|(_, height)| !height.is_nan()) {
                 let fade = fade.as_ref().map_or(1.0, |fade| f64::from(fade[r * columns + c]));
                 let weight = fade * patch.weight(column + c, row + r);
-                let (base, [sum, weights]) = (&mut self.base[into + c], &mut self.sums[into + c]);
+                let (base, [sum, weights]) = (&mut bases[left + c], &mut sums[left + c]);
                 if base.is_nan() {
                     *base = height;
                 }
                 *sum += weight * (f64::from(height) - f64::from(*base));
                 *weights += weight;
             }
-        }
+        });
     }
 
     /// Lays the group over what has been laid before, and begins the next one.

@@ -4,6 +4,7 @@ use crate::reduce::Reducer;
 use crate::{Crs, Error, Georeference, Info, Level, Source};
 use glam::{DAffine2, DVec2};
 use littoral::field::Window;
+use rayon::prelude::*;
 use std::path::PathBuf;
 
 /// A position so near to a sample (in samples) is that sample: coordinates are written with so few digits.
@@ -119,13 +120,7 @@ impl Tile {
         let first = DVec2::new(window.column as f64, window.row as f64);
         let low = low.max(first);
         let high = high.min(first + DVec2::new(window.columns as f64, window.rows as f64) - 1.0);
-        let count = high - low + 1.0;
-        (count.min_element() >= 1.0).then(|| Window {
-            column: low.x as usize,
-            row: low.y as usize,
-            columns: count.x as usize,
-            rows: count.y as usize,
-        })
+        low.cmple(high).all().then(|| samples_within(low, high))
     }
 
     /// The heights of a part of a lattice; `None` if the file does not reach it.
@@ -146,23 +141,18 @@ impl Tile {
             let most = pixels(size) - 1.0;
             let low = (low - ALIGNED).floor().clamp(DVec2::ZERO, most - 1.0);
             let high = (high + ALIGNED).ceil().clamp(low + 1.0, most);
-            let count = high - low + 1.0;
-            let part = Window {
-                column: low.x as usize,
-                row: low.y as usize,
-                columns: count.x as usize,
-                rows: count.y as usize,
-            };
+            let part = samples_within(low, high);
             let samples = self.read(&way, part)?;
-            let mut heights = Vec::with_capacity(window.columns * window.rows);
-            for row in 0..window.rows {
-                for column in 0..window.columns {
+            let mut heights = vec![f32::NAN; window.columns * window.rows];
+            heights.par_chunks_exact_mut(window.columns).enumerate().for_each(|(row, line)| {
+                for (column, height) in line.iter_mut().enumerate() {
                     let at = map.transform_point2(first + DVec2::new(column as f64, row as f64));
-                    let within =
-                        at.cmpge(DVec2::splat(-0.5 - ALIGNED)).all() && at.cmple(pixels(size) - 0.5 + ALIGNED).all();
-                    heights.push(if within { between(&samples, part, at - low) } else { f32::NAN });
+                    let within = at.cmpge(DVec2::splat(-0.5 - ALIGNED)) & at.cmple(pixels(size) - 0.5 + ALIGNED);
+                    if within.all() {
+                        *height = between(&samples, part, at - low);
+                    }
                 }
-            }
+            });
             heights
         };
         Ok(Some(Patch { window, heights, file_from_lattice: map, size: pixels(size) }))
@@ -227,6 +217,12 @@ fn pixels([columns, rows]: [usize; 2]) -> DVec2 {
 fn bounds(map: DAffine2, low: DVec2, high: DVec2) -> (DVec2, DVec2) {
     let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)].map(|c| map.transform_point2(c));
     (corners.into_iter().fold(corners[0], DVec2::min), corners.into_iter().fold(corners[0], DVec2::max))
+}
+
+/// The window from one sample to another, both included.
+fn samples_within(low: DVec2, high: DVec2) -> Window {
+    let count = high - low + 1.0;
+    Window { column: low.x as usize, row: low.y as usize, columns: count.x as usize, rows: count.y as usize }
 }
 
 /// Whether two windows share a sample.
