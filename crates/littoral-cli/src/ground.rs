@@ -3,8 +3,37 @@
 use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DAffine2, DVec2};
 use littoral::field::{Land, Raster, Window};
-use littoral_data::{Crs, Dem, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
+use littoral_data::{Code, Crs, Dem, Encoding, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
 use std::path::{Path, PathBuf};
+
+/// How files are read, where they do not say it themselves.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Reading {
+    /// What the pixels of a PNG mean [default: told from the heights that they give]
+    #[arg(long, value_enum, value_name = "ENCODING")]
+    encoding: Option<EncodingName>,
+}
+
+/// What the pixels of a PNG mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum EncodingName {
+    /// 256 R + G + B/256 - 32768 metres
+    Terrarium,
+    /// -10000 + 0.1 (65536 R + 256 G + B) metres, Terrain-RGB
+    Mapbox,
+    /// Greys are metres
+    Grey,
+}
+
+impl EncodingName {
+    fn encoding(self) -> Encoding {
+        match self {
+            EncodingName::Terrarium => Encoding::Code(Code::Terrarium),
+            EncodingName::Mapbox => Encoding::Code(Code::TerrainRgb),
+            EncodingName::Grey => Encoding::Grey,
+        }
+    }
+}
 
 /// An opened height file, or several as one.
 pub struct Opened {
@@ -43,13 +72,13 @@ impl System {
 
 impl Opened {
     /// Opens a file and passes on what its reader noticed.
-    pub fn open(file: &Path, talk: &mut Talk) -> Result<Opened, Failure> {
-        Opened::open_all(&[file.to_owned()], talk)
+    pub fn open(file: &Path, reading: Reading, talk: &mut Talk) -> Result<Opened, Failure> {
+        Opened::open_all(&[file.to_owned()], reading, talk)
     }
 
     /// Opens files as one, and passes on what their readers noticed.
-    pub fn open_all(files: &[PathBuf], talk: &mut Talk) -> Result<Opened, Failure> {
-        let source = littoral_data::open_all(files)?;
+    pub fn open_all(files: &[PathBuf], reading: Reading, talk: &mut Talk) -> Result<Opened, Failure> {
+        let source = littoral_data::open_all(files, reading.encoding.map(EncodingName::encoding))?;
         let frame = Frame::of(&source.info().georeference);
         let opened = Opened { file: littoral_data::name_of_all(files), frame, several: files.len() > 1, source };
         opened.pass_on(&opened.info().warnings.clone(), talk);

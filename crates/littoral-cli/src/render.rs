@@ -1,7 +1,7 @@
 //! `littoral render`: pictures and films.
 
 use crate::film;
-use crate::ground::{Frame, Opened, System, height_at};
+use crate::ground::{Frame, Opened, Reading, System, height_at};
 use crate::input::{self, Target, WaterLevel};
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
@@ -39,6 +39,8 @@ pub struct Render {
     /// one; none for the built-in coast
     #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
     /// The file to write: .png, .exr (linear light); for films .mp4, .mov, .mkv or a folder for frames
     /// [default: littoral.png, littoral.mp4]
     #[arg(long, short, value_name = "FILE")]
@@ -347,7 +349,7 @@ impl Render {
 
     /// Land at a resolution that fits a picture.
     fn loaded(&self, files: &[PathBuf], talk: &mut Talk) -> Result<(Land, Frame, String), Failure> {
-        let mut opened = Opened::open_all(files, talk)?;
+        let mut opened = Opened::open_all(files, self.reading, talk)?;
         let (land, frame) = opened.fitting(if self.full { usize::MAX } else { FITTING }, talk)?;
         Ok((land, frame, opened.datum()))
     }

@@ -1,6 +1,6 @@
 //! `littoral viewshed`: what is seen from a point.
 
-use crate::ground::{Opened, System};
+use crate::ground::{Opened, Reading, System};
 use crate::input;
 use crate::plot::ending;
 use crate::sight::{Curved, explained};
@@ -45,6 +45,8 @@ pub struct Viewshed {
     lonlat: bool,
     #[command(flatten)]
     curved: Curved,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 #[derive(Serialize)]
@@ -66,7 +68,7 @@ impl Viewshed {
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
         ending(&self.out, &["tif", "tiff"])?;
         crate::render::check_output(&self.out, &[&self.file])?;
-        let mut opened = Opened::open(&self.file, talk)?;
+        let mut opened = Opened::open(&self.file, self.reading, talk)?;
         let started = Instant::now();
         let system = System::of(self.lonlat);
         let from = opened.local(system, self.from.truncate())?;

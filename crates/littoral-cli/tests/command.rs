@@ -347,6 +347,22 @@ fn files_that_join_are_drawn_as_one() {
 }
 
 #[test]
+fn the_encoding_of_a_png_can_be_chosen() {
+    let desk = Desk::new();
+    let file = desk.path("tile.png");
+    let mut encoder = png::Encoder::new(std::fs::File::create(&file).expect("a file"), 2, 2);
+    encoder.set_color(png::ColorType::Rgb);
+    let grey = [5, 5, 5, 6, 6, 6, 7, 7, 7, 8, 8, 8];
+    encoder.write_header().expect("a header").write_image_data(&grey).expect("pixels");
+    assert!(fails(&["info", &file], 1).contains("choose the encoding"));
+    assert_eq!(json(&["info", &file, "--encoding", "grey"])["last"], 8.0);
+    assert_eq!(json(&["height", &file, "--at", "0.5,0.5", "--encoding", "grey"])["heights"][0], 5.0);
+    assert_eq!(json(&["info", &file, "--encoding", "terrarium"])["void"], 4);
+    fails(&["info", &file, "--encoding", "webp"], 2);
+    assert!(fails(&["info", &desk.land, "--encoding", "grey"], 1).contains("expected a PNG"));
+}
+
+#[test]
 fn passes_are_floating_point_and_agree_with_the_ground() {
     let desk = Desk::new();
     let out = desk.path("linear.exr");

@@ -1,5 +1,6 @@
 //! What a reader offers, and how a file becomes land.
 
+use crate::formats::tiles::Encoding;
 use crate::reduce::Reducer;
 use crate::{Error, Georeference, formats};
 use littoral::field::{Raster, Window};
@@ -118,6 +119,16 @@ impl Source for MemorySource {
 /// If the file cannot be read, is of no known format, or is broken.
 pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
     formats::open(file)
+}
+
+/// As [`open`], and the pixels of a PNG in this encoding; `None` to tell it from the heights that they give.
+///
+/// # Errors
+/// As [`open`]; also if the file is no PNG, or its pixels cannot be in that encoding.
+pub fn open_as(file: &Path, encoding: Option<Encoding>) -> Result<Box<dyn Source>, Error> {
+    let mut input = formats::Input::file(file)?;
+    input.encoding = encoding;
+    formats::open_input(input)
 }
 
 /// How much of a file to load.

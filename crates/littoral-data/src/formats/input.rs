@@ -1,5 +1,6 @@
 //! A file's bytes, wherever they lie: on disk, inside an archive, or in memory for tests and fuzzers.
 
+use super::tiles::Encoding;
 use crate::Error;
 use std::ffi::OsString;
 use std::fs::File;
@@ -17,6 +18,8 @@ pub(super) const APPENDED: [&str; 3] = ["aux.xml", "msk", "msk.ovr"];
 pub struct Input {
     /// The file's name: shown in messages, and a hint for formats that keep their place or size in it.
     pub name: PathBuf,
+    /// What the pixels of a PNG mean; `None` to tell it from the heights that they give.
+    pub encoding: Option<Encoding>,
     length: u64,
     bytes: Bytes,
     beside: Vec<(String, Vec<u8>)>,
@@ -43,13 +46,19 @@ impl Input {
         }
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         let bytes = Bytes::Disk(file);
-        Ok(Input { name: path.to_owned(), length: metadata.len(), bytes, beside: Vec::new() })
+        Ok(Input { name: path.to_owned(), encoding: None, length: metadata.len(), bytes, beside: Vec::new() })
     }
 
     /// Bytes in memory under a name. Companion files are only those added by [`Input::with_sidecar`].
     pub fn memory(name: impl Into<PathBuf>, bytes: Vec<u8>) -> Input {
         let length = bytes.len() as u64;
-        Input { name: name.into(), length, bytes: Bytes::Memory(Cursor::new(bytes)), beside: Vec::new() }
+        Input {
+            name: name.into(),
+            encoding: None,
+            length,
+            bytes: Bytes::Memory(Cursor::new(bytes)),
+            beside: Vec::new(),
+        }
     }
 
     /// Adds a companion file by its extension in lower case and without the dot, such as `hdr` or `prj`.

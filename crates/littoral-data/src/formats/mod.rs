@@ -45,11 +45,18 @@ pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
 /// # Errors
 /// As [`open`].
 pub fn open_input(mut input: Input) -> Result<Box<dyn Source>, Error> {
-    let head = input.head(HEAD)?;
+    let (head, encoding) = (input.head(HEAD)?, input.encoding);
     if archive::is_gzip(&head) {
         input = archive::unpack_gzip(input)?;
     } else if archive::is_zip(&head) {
         input = archive::unpack_zip(input)?;
+    }
+    input.encoding = encoding;
+    let head = input.head(HEAD)?;
+    if encoding.is_some() && !png::sniff(&head) {
+        return Err(
+            input.error("expected a PNG, whose encoding can be chosen, got another format; leave the choice out")
+        );
     }
     open_unpacked(input)
 }

@@ -18,12 +18,12 @@ mod blend;
 mod join;
 mod tile;
 
-use crate::{Error, Georeference, Info, Level, Source};
+use crate::{Encoding, Error, Georeference, Info, Level, Source, open_as};
 use blend::Blend;
 use littoral::field::Window;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use tile::Tile;
+use tile::{Reopen, Tile};
 
 /// So many files are kept open: a mosaic of hundreds must not take as many handles, nor as many caches.
 const MOST_OPEN: usize = 32;
@@ -43,17 +43,17 @@ pub struct Mosaic {
     margin: usize,
 }
 
-/// Opens files as one source: one file as it is, several as a [`Mosaic`].
+/// Opens files as one source: one file as it is, several as a [`Mosaic`]; PNGs in this encoding, see [`open_as`].
 ///
 /// # Errors
-/// As [`open`](crate::open) for each file, and as [`Mosaic::new`].
-pub fn open_all(files: &[PathBuf]) -> Result<Box<dyn Source>, Error> {
+/// As [`open_as`] for each file, and as [`Mosaic::new`].
+pub fn open_all(files: &[PathBuf], encoding: Option<Encoding>) -> Result<Box<dyn Source>, Error> {
     if let [file] = files {
-        return crate::open(file);
+        return open_as(file, encoding);
     }
     let mut tiles = Vec::with_capacity(files.len());
     for file in files {
-        let mut tile = Tile::new(file.clone(), crate::open(file)?, true)?;
+        let mut tile = Tile::new(file.clone(), open_as(file, encoding)?, Reopen::As(encoding))?;
         if tiles.len() >= MOST_OPEN {
             tile.close();
         }
@@ -79,7 +79,7 @@ impl Mosaic {
     /// If there are none, one does not say where it lies, or they are not in one coordinate system. Geographic systems count
     /// as one; so do projected ones that agree in their coordinates, whatever they are called.
     pub fn new(sources: Vec<(PathBuf, Box<dyn Source>)>) -> Result<Mosaic, Error> {
-        let tiles = sources.into_iter().map(|(file, source)| Tile::new(file, source, false));
+        let tiles = sources.into_iter().map(|(file, source)| Tile::new(file, source, Reopen::Never));
         Mosaic::of_tiles(tiles.collect::<Result<_, _>>()?)
     }
 

@@ -251,8 +251,9 @@ fn overviews_are_read_where_all_files_have_them() {
 
 #[test]
 fn a_file_too_fine_for_the_lattice_is_averaged_down() {
-    let mut fine = Tile::new("fine.tif".into(), Box::new(tile([500_000.0, 5_000_000.0], 1.0, [101, 70], plane)), false)
-        .expect("large enough");
+    let mut fine =
+        Tile::new("fine.tif".into(), Box::new(tile([500_000.0, 5_000_000.0], 1.0, [101, 70], plane)), Reopen::Never)
+            .expect("large enough");
     let lattice = tile([500_000.0, 5_000_000.0], 10.0, [11, 7], plane).info().georeference.clone();
     let patch =
         fine.patch(&lattice, Window { column: 0, row: 0, columns: 11, rows: 7 }).expect("reads").expect("meets");
@@ -334,7 +335,7 @@ fn files_are_opened_again_and_their_warnings_gathered() {
             file
         })
         .collect();
-    let mut source = open_all(&files).expect("opens");
+    let mut source = open_all(&files, None).expect("opens");
     for _ in 0..2 {
         let dem = load_from(&mut *source, &name_of_all(&files), LoadOptions { most_samples: 1 << 20 }, &|_| {})
             .expect("loads");

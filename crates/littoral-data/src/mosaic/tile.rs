@@ -1,7 +1,7 @@
 //! One file of a mosaic, and its heights on the mosaic's lattice.
 
 use crate::reduce::Reducer;
-use crate::{Crs, Error, Georeference, Info, Level, Source};
+use crate::{Crs, Encoding, Error, Georeference, Info, Level, Source, open_as};
 use glam::{DAffine2, DVec2};
 use littoral::field::Window;
 use rayon::prelude::*;
@@ -27,8 +27,16 @@ pub(super) struct Tile {
     pub info: Info,
     levels: Vec<Level>,
     source: Option<Box<dyn Source>>,
-    /// Whether it is a file that can be opened again.
-    on_disk: bool,
+    reopen: Reopen,
+}
+
+/// Whether a source can be opened again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Reopen {
+    /// It is kept open.
+    Never,
+    /// It is a file, opened like this.
+    As(Option<Encoding>),
 }
 
 /// A file's heights on a part of a lattice.
@@ -54,18 +62,18 @@ struct Way {
 }
 
 impl Tile {
-    pub(super) fn new(file: PathBuf, source: Box<dyn Source>, on_disk: bool) -> Result<Tile, Error> {
+    pub(super) fn new(file: PathBuf, source: Box<dyn Source>, reopen: Reopen) -> Result<Tile, Error> {
         let (info, levels) = (source.info().clone(), source.levels().to_vec());
         if info.columns < 2 || info.rows < 2 {
             let problem = format!("expected at least 2 × 2 samples, got {} × {}", info.columns, info.rows);
             return Err(Error::content(&file, problem));
         }
-        Ok(Tile { file, info, levels, source: Some(source), on_disk })
+        Ok(Tile { file, info, levels, source: Some(source), reopen })
     }
 
     /// Whether it is open and can be opened again.
     pub(super) fn closable(&self) -> bool {
-        self.on_disk && self.source.is_some()
+        self.reopen != Reopen::Never && self.source.is_some()
     }
 
     /// Lets go of the file until it is read next.
@@ -160,8 +168,8 @@ impl Tile {
 
     /// Averages of a window of the file, opened again if need be.
     fn read(&mut self, way: &Way, window: Window) -> Result<Vec<f32>, Error> {
-        if self.source.is_none() {
-            let source = crate::open(&self.file)?;
+        if let (None, Reopen::As(encoding)) = (&self.source, self.reopen) {
+            let source = open_as(&self.file, encoding)?;
             if source.levels() != self.levels {
                 let problem = "expected the file as it was opened first, got one of another size; leave it as it is while it is read";
                 return Err(Error::content(&self.file, problem));
