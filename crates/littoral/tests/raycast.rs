@@ -1,6 +1,6 @@
 //! Rays against brute force over all patches, on thousands of small maps.
 
-use glam::{DVec2, DVec3, UVec2, Vec2};
+use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::{HeightField, HeightRange, Land, Raster, Window};
 use littoral::raycast::{LocalRay, Simd};
 use littoral::space::{Cell, Ray, View};
@@ -237,9 +237,15 @@ proptest! {
             caster.any_hits(&rays, &mut any);
             prop_assert!(any.iter().zip(&distances).all(|(any, t)| *any == t.is_finite()));
         }
+        let (best, portable) = (land.caster(anchor), land.caster(anchor).with_simd(Simd::Portable));
         for (ray, distance) in rays.iter().zip(distances) {
+            let single = best.first_hit(ray);
+            prop_assert_eq!(portable.first_hit(ray).to_bits(), single.to_bits(), "portable single rays differ");
+            prop_assert_eq!(best.any_hit(ray), single.is_finite());
             let exact = Ray { origin: anchor + ray.origin.as_dvec3(), direction: ray.direction.as_dvec3(), reach: f64::from(ray.reach) };
-            check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
+            for distance in [distance, single] {
+                check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
+            }
         }
     }
 
@@ -328,6 +334,62 @@ proptest! {
             caster.par_any_hits(&locals, &mut hits);
             prop_assert!(visible.iter().zip(&hits).all(|(visible, hit)| visible != hit));
         }
+    }
+}
+
+/// Maps of many blocks, and of more than one of the coarsest, where brute force takes too long: held against the walk
+/// that is held against brute force. From above, low and high, to all sides, through the whole map.
+#[test]
+fn single_rays_equal_the_exact_walk_on_large_maps() {
+    for (seed, columns, rows, spacing) in
+        [(1, 33, 257, 1.0), (2, 258, 71, 30.0), (3, 700, 650, 7.3), (4, 5000, 90, 2.0), (5, 5, 4500, 1.0)]
+    {
+        let mut state = u64::from(seed);
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let noise = littoral::field::noise::Fbm::new(180.0 * spacing, 25.0 * spacing, 7, seed);
+        let place = |i: usize| DVec2::new((i % columns) as f64, (i / columns) as f64) * spacing;
+        let heights = (0..columns * rows).map(|i| noise.at(place(i)).value as f32).collect();
+        let land =
+            Land::at(Raster::new(columns, rows, DVec2::splat(spacing), heights).expect("valid"), DVec2::new(9e5, -7e4));
+        let (mut hits, mut left) = (0, 0);
+        for _ in 0..4000 {
+            let mut xy = || {
+                land.origin()
+                    + land.extent() * DVec2::new(random(), random()).clamp(DVec2::splat(0.001), DVec2::splat(0.999))
+            };
+            let (from, to) = (xy(), xy());
+            let ground = |xy: DVec2| f64::from(land.height_at(xy).expect("on the map"));
+            let (from, to) = (
+                from.extend(ground(from) + spacing * 60.0 * random() * random()),
+                to.extend(ground(to) + spacing * 20.0 * (random() - 0.5)),
+            );
+            let caster = land.caster(from);
+            let ray = LocalRay::new(Vec3::ZERO, (to - from).as_vec3());
+            let got = caster.first_hit(&ray);
+            assert_eq!(caster.clone().with_simd(Simd::Portable).first_hit(&ray).to_bits(), got.to_bits());
+            let exact = Ray::new(from, ray.direction.as_dvec3());
+            let want = land.first_hit(&exact).map_or(f64::INFINITY, |hit| hit.distance);
+            let length = exact.direction.length();
+            hits += usize::from(got.is_finite());
+            // Rays that graze may pass by a hair: then the surface is that near.
+            let near = |t: f64| {
+                let point = exact.at(t);
+                land.height_at(point.truncate()).is_some_and(|h| {
+                    (point.z - f64::from(h)).abs() < 1e-5 * spacing * (1.0 + t * length / spacing * 0.1)
+                })
+            };
+            let got = f64::from(got);
+            let same = got == want || ((got - want) * length).abs() < 2e-4 * spacing + 2e-6 * want * length;
+            if !same {
+                left += 1;
+                assert!(near(got.min(want)), "{got} instead of {want} for {exact:?} on {columns} × {rows}");
+            }
+        }
+        assert!(hits > 1000, "only {hits} hits on {columns} × {rows}");
+        assert!(left < 20, "{left} rays graze on {columns} × {rows}");
     }
 }
 

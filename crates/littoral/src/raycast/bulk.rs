@@ -5,6 +5,7 @@ use super::camera::ViewRays;
 use super::lanes::{Avx2, Avx512};
 use super::lanes::{Lanes, Portable};
 use super::scene::Scene;
+use super::single::{Found, Single};
 use super::stream::{self, BLOCK, LocalRay, Prepared, Rays};
 use super::walk;
 use crate::field::Land;
@@ -20,7 +21,7 @@ pub enum Simd {
     Portable,
     /// Eight lanes of AVX2 (x86-64).
     Avx2,
-    /// Sixteen lanes of AVX-512 F and DQ (x86-64).
+    /// Sixteen lanes of AVX-512 F, BW, DQ and VL (x86-64).
     Avx512,
 }
 
@@ -37,7 +38,7 @@ impl Simd {
             #[cfg(target_arch = "x86_64")]
             Simd::Avx512 => {
                 use std::arch::is_x86_feature_detected as has;
-                Simd::Avx2.available() && has!("avx512f") && has!("avx512dq")
+                Simd::Avx2.available() && has!("avx512f") && has!("avx512dq") && has!("avx512bw") && has!("avx512vl")
             }
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
@@ -59,13 +60,16 @@ pub struct RayCaster<'a> {
     pub(super) land: &'a Land,
     pub(super) anchor: DVec3,
     pub(super) scene: Option<Scene<'a>>,
+    single: Option<Single<'a>>,
     pub(super) simd: Simd,
 }
 
 impl Land {
     /// A caster of many rays whose origins count from `anchor`.
     pub fn caster(&self, anchor: DVec3) -> RayCaster<'_> {
-        RayCaster { land: self, anchor, scene: Scene::new(self, anchor), simd: Simd::best() }
+        let scene = Scene::new(self, anchor);
+        let single = scene.as_ref().and_then(|scene| Single::new(self, scene));
+        RayCaster { land: self, anchor, scene, single, simd: Simd::best() }
     }
 }
 
@@ -78,6 +82,20 @@ impl<'a> RayCaster<'a> {
         assert!(simd.available(), "{simd:?} is not available here");
         self.simd = simd;
         self
+    }
+
+    /// The distance to the first hit of one ray (in lengths of its direction), infinity for none, from above and below as
+    /// [`Land::first_hit`]. For rays that come one by one; many at a time are faster as [`RayCaster::first_hits`].
+    pub fn first_hit(&self, ray: &LocalRay) -> f32 {
+        match self.single.as_ref().map_or(Found::Left, |single| single.first_hit(self.simd == Simd::Avx512, ray)) {
+            Found::Distance(distance) => distance,
+            Found::Left => self.exact(ray),
+        }
+    }
+
+    /// Whether one ray meets the surface anywhere from its origin to its reach.
+    pub fn any_hit(&self, ray: &LocalRay) -> bool {
+        self.first_hit(ray) < f32::INFINITY
     }
 
     /// The distance to the first hit of each ray (in lengths of its direction), infinity where there is none, from above
