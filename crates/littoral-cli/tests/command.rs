@@ -352,12 +352,15 @@ fn the_encoding_of_a_png_can_be_chosen() {
     let file = desk.path("tile.png");
     let mut encoder = png::Encoder::new(std::fs::File::create(&file).expect("a file"), 2, 2);
     encoder.set_color(png::ColorType::Rgb);
-    let grey = [5, 5, 5, 6, 6, 6, 7, 7, 7, 8, 8, 8];
-    encoder.write_header().expect("a header").write_image_data(&grey).expect("pixels");
+    // Reds of 200 are above every mountain in both codes, reds of 129 in one.
+    let pixels = [200, 0, 0, 200, 0, 0, 200, 0, 0, 129, 0, 0];
+    encoder.write_header().expect("a header").write_image_data(&pixels).expect("pixels");
     assert!(fails(&["info", &file], 1).contains("choose the encoding"));
-    assert_eq!(json(&["info", &file, "--encoding", "grey"])["last"], 8.0);
-    assert_eq!(json(&["height", &file, "--at", "0.5,0.5", "--encoding", "grey"])["heights"][0], 5.0);
-    assert_eq!(json(&["info", &file, "--encoding", "terrarium"])["void"], 4);
+    let info = json(&["info", &file, "--encoding", "terrarium"]);
+    assert_eq!((&info["last"], &info["void"]), (&Value::from(256.0), &Value::from(3)));
+    assert_eq!(json(&["height", &file, "--at", "1.5,1.5", "--encoding", "terrarium"])["heights"][0], 256.0);
+    assert_eq!(json(&["info", &file, "--encoding", "mapbox"])["void"], 4);
+    assert!(fails(&["info", &file, "--encoding", "grey"], 1).contains("got colours"));
     fails(&["info", &file, "--encoding", "webp"], 2);
     assert!(fails(&["info", &desk.land, "--encoding", "grey"], 1).contains("expected a PNG"));
 }

@@ -81,20 +81,24 @@ enum Values {
     Colour(Vec<u32>),
 }
 
-/// The same pixels, in the encoding that was asked for.
+/// The same pixels in the encoding that was asked for; if none was, colours that are all grey are greys, saved by a program
+/// that knows nothing else.
 fn as_asked(values: Values, encoding: Option<Encoding>) -> Result<Values, String> {
     match (values, encoding) {
         (Values::Grey { .. }, Some(Encoding::Code(code))) => {
             Err(format!("expected colours, to be read as {code:?}, got greys; leave out the encoding"))
         }
-        (Values::Colour(colours), Some(Encoding::Grey)) => {
-            let grey = |&pixel: &u32| {
-                let [transparent, r, g, b] = pixel.to_be_bytes();
-                (transparent != 0 || (r == g && g == b)).then(|| if transparent != 0 { f32::NAN } else { f32::from(g) })
-            };
-            let values: Option<Vec<f32>> = colours.iter().map(grey).collect();
-            let values = values.ok_or("expected red, green and blue to be equal, as in greys, got colours")?;
-            Ok(Values::Grey { values, bits: 8 })
+        (Values::Colour(colours), None | Some(Encoding::Grey)) => {
+            let opaque = || colours.iter().filter(|&p| p & TRANSPARENT == 0);
+            let all_grey = opaque().all(|p| p & 0xFF == p >> 8 & 0xFF && p & 0xFF == p >> 16 & 0xFF);
+            if all_grey && opaque().next().is_some() {
+                let grey = |p: u32| if p & TRANSPARENT != 0 { f32::NAN } else { (p & 0xFF) as f32 };
+                return Ok(Values::Grey { values: colours.into_iter().map(grey).collect(), bits: 8 });
+            }
+            match encoding {
+                None => Ok(Values::Colour(colours)),
+                Some(_) => Err("expected red, green and blue to be equal, as in greys, got colours".into()),
+            }
         }
         (values, _) => Ok(values),
     }
@@ -176,18 +180,7 @@ fn decode(input: &mut Input) -> Result<Pixels, Error> {
         Values::Grey { values, .. } => values.resize(samples, f32::NAN),
         Values::Colour(colours) => colours.resize(samples, TRANSPARENT),
     }
-    Ok(Pixels { columns, rows, values: greys_of_colours(values), warnings })
-}
-
-/// Colours that are all grey are greys saved by a program that knows nothing else.
-fn greys_of_colours(values: Values) -> Values {
-    match values {
-        Values::Colour(colours) if colours.iter().all(|p| p & 0xFF == p >> 8 & 0xFF && p & 0xFF == p >> 16 & 0xFF) => {
-            let grey = |p: u32| if p & TRANSPARENT != 0 { f32::NAN } else { (p & 0xFF) as f32 };
-            Values::Grey { values: colours.into_iter().map(grey).collect(), bits: 8 }
-        }
-        values => values,
-    }
+    Ok(Pixels { columns, rows, values, warnings })
 }
 
 #[cfg(test)]
@@ -247,11 +240,16 @@ mod tests {
             Ok::<_, Error>((source.info().clone(), source.read(0, Window { column: 0, row: 0, columns, rows })?))
         };
         let (terrarium, mapbox) = (Encoding::Code(tiles::Code::Terrarium), Encoding::Code(tiles::Code::TerrainRgb));
-        // Grey colours: a picture to every code, heights to whoever says so. The last is transparent.
-        let grey = encode(3, 1, ColorType::Rgba, BitDepth::Eight, &[7, 7, 7, 255, 9, 9, 9, 255, 1, 2, 3, 0]);
-        assert!(open(Input::memory("t.png", grey.clone())).err().expect("a picture").to_string().contains("encoding"));
-        let (info, heights) = read(grey.clone(), Encoding::Grey).expect("reads");
-        assert_eq!((info.format, &heights[..2], heights[2].is_nan()), ("PNG", &[7.0, 9.0][..], true));
+        // Colours that are all grey are greys, unless someone says otherwise. The last is transparent.
+        let grey = || encode(3, 1, ColorType::Rgba, BitDepth::Eight, &[7, 7, 7, 255, 140, 140, 140, 255, 1, 2, 3, 0]);
+        let (info, heights) = read(grey(), Encoding::Grey).expect("reads");
+        assert_eq!((info.format, &heights[..2], heights[2].is_nan()), ("PNG", &[7.0, 140.0][..], true));
+        let (_, heights) = read(grey(), terrarium).expect("reads");
+        assert_eq!((heights[0].is_nan(), heights[1]), (true, 3212.546_875));
+        let picture = encode(2, 1, ColorType::Rgb, BitDepth::Eight, &[250, 0, 0, 20, 7, 0]);
+        assert!(
+            open(Input::memory("t.png", picture)).err().expect("a picture").to_string().contains("choose the encoding")
+        );
         // (1, 0, 0) is 6553.6 − 10 000 m in one code and far below the sea bed in the other.
         let colour = || encode(2, 1, ColorType::Rgb, BitDepth::Eight, &[1, 0, 0, 128, 1, 0]);
         let (info, heights) = read(colour(), mapbox).expect("reads");
