@@ -434,7 +434,7 @@ fn gdals_notes_beside_the_file_are_read() {
     let mut maker = Maker::new(8, 6);
     maker.values = (0..48).map(f64::from).collect();
     maker.text(42113, "3");
-    let notes = "<PAMDataset><SRS>EPSG_NONSENSE</SRS><GeoTransform>500, 10, 0, 900, 0, -10</GeoTransform>\
+    let notes = "<PAMDataset><SRS></SRS><GeoTransform>500, 10, 0, 900, 0, -10</GeoTransform>\
         <Metadata><MDI key=\"AREA_OR_POINT\">Point</MDI></Metadata><PAMRasterBand band=\"1\"><NoDataValue>7</NoDataValue>\
         <Scale>2</Scale><Offset>1</Offset><UnitType>cm</UnitType></PAMRasterBand></PAMDataset>";
     let mut source =

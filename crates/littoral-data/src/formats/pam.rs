@@ -65,7 +65,15 @@ impl Notes {
             }
         }
         if let Some(wkt) = text("SRS") {
-            self.crs = Some(Crs::from_wkt(wkt)).filter(|crs| *crs != Crs::Unknown);
+            let code = wkt.trim().strip_prefix("EPSG:").and_then(|code| code.parse().ok());
+            let crs = code.and_then(Crs::from_epsg).unwrap_or_else(|| Crs::from_wkt(wkt));
+            if crs == Crs::Unknown && !wkt.trim().is_empty() {
+                self.warnings.push(format!(
+                    "the coordinate system in the .aux.xml beside the file is not understood and left aside: \"{:.60}\"",
+                    wkt.trim()
+                ));
+            }
+            self.crs = Some(crs).filter(|crs| *crs != Crs::Unknown);
             self.vertical = VerticalDatum::from_wkt(wkt).map(|(datum, _)| datum);
         }
         let items = children().filter(|node| node.has_tag_name("Metadata") && node.attribute("domain").is_none());
@@ -203,6 +211,9 @@ mod tests {
         let band = "<PAMRasterBand><Scale>0</Scale><Offset>inf</Offset><NoDataValue>none</NoDataValue></PAMRasterBand>";
         let notes = beside(&format!("<PAMDataset>{band}<SRS>nonsense</SRS></PAMDataset>"));
         assert_eq!((notes.band.scale, notes.band.offset, notes.band.nodata, notes.crs), (None, None, None, None));
+        assert!(notes.warnings[0].contains("nonsense"));
+        let code = beside("<PAMDataset><SRS> EPSG:32611 </SRS></PAMDataset>");
+        assert_eq!((code.crs.as_ref().map(Crs::name), code.warnings.len()), (Some("EPSG:32611"), 0));
         assert!(beside("<PAMDataset/>").warnings.is_empty());
         assert!(Notes::beside(&Input::memory("land.tif", Vec::new())).warnings.is_empty());
     }
