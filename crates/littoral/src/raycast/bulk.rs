@@ -86,6 +86,7 @@ impl<'a> RayCaster<'a> {
 
     /// The distance to the first hit of one ray (in lengths of its direction), infinity for none, from above and below as
     /// [`Land::first_hit`]. For rays that come one by one; many at a time are faster as [`RayCaster::first_hits`].
+    #[inline]
     pub fn first_hit(&self, ray: &LocalRay) -> f32 {
         match self.single.as_ref().map_or(Found::Left, |single| single.first_hit(self.simd == Simd::Avx512, ray)) {
             Found::Distance(distance) => distance,
