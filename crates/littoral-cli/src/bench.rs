@@ -4,7 +4,7 @@ use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::{Land, RangePyramid, Raster, noise::Fbm};
 use littoral::raycast::{LocalRay, Simd, Station, Viewshed};
-use littoral::space::{Ray, View};
+use littoral::space::View;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::hint::black_box;
