@@ -4,7 +4,7 @@ use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::{Land, RangePyramid, Raster, noise::Fbm};
 use littoral::raycast::{LocalRay, Simd, Station, Viewshed};
-use littoral::space::{Ray, View};
+use littoral::space::View;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::hint::black_box;
@@ -213,10 +213,9 @@ fn camera(land: &Land, at: DVec2, above: f64, pitch: f64) -> Camera {
     let millions = rays.len() as f64 / 1e6;
     let caster = land.caster(view.eye);
 
-    const EACH: u32 = 16;
-    let single = median(3, || {
-        for i in (0..FRAME.x * FRAME.y).step_by(EACH as usize) {
-            black_box(land.first_hit(&Ray::new(view.eye, direction(i).as_dvec3())));
+    let single = median(RUNS, || {
+        for ray in &rays {
+            black_box(caster.first_hit(ray));
         }
     });
     let mut distances = vec![0.0; rays.len()];
@@ -229,7 +228,7 @@ fn camera(land: &Land, at: DVec2, above: f64, pitch: f64) -> Camera {
     let shadows = median(RUNS, || caster.any_hits(&shadow_rays, &mut shaded));
     let coherent = median(RUNS, || caster.view_hits(&view, Vec2::splat(0.5), 0..FRAME.y, &mut distances));
     Camera {
-        single: millions / f64::from(EACH) / single,
+        single: millions / single,
         stream: millions / stream,
         coherent: millions / coherent,
         shadows: shadow_rays.len() as f64 / 1e6 / shadows.max(1e-9),

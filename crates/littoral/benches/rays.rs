@@ -77,7 +77,9 @@ fn cameras(land: &Land, name: &str, view: View) {
     let seconds = median(5, || caster.any_hits(&shadows, &mut shaded));
     print!(", shadow {:.2}", shadows.len() as f64 / seconds * 1e-6);
     let seconds = median(5, || caster.view_hits(&view, Vec2::splat(0.5), 0..SIZE.y, &mut distances));
-    println!(", view {:.2} million rays a second", rays.len() as f64 / seconds * 1e-6);
+    print!(", view {:.2}", rays.len() as f64 / seconds * 1e-6);
+    let seconds = median(5, || caster.view_hits_by_footprint(&view, Vec2::splat(0.5), 1.0, 0..SIZE.y, &mut distances));
+    println!(", by footprint {:.2} million rays a second", rays.len() as f64 / seconds * 1e-6);
 }
 
 /// Heights at random places, and lines of sight between random places 2 m and 400 m above the ground.

@@ -21,7 +21,6 @@ use super::scene::Scene;
 use super::stream::LocalRay;
 use crate::field::{BLOCK_LEVELS, Block, Blocks, Land};
 use glam::Vec4;
-use std::hint::cold_path;
 
 /// Rays that fall or rise more than this many metres for each metre along their major axis count as steep.
 const STEEP: f32 = 16.0;
@@ -245,7 +244,7 @@ impl<'a> Single<'a> {
         // A branch that is foreseen costs less than waiting for the sum.
         let mut begin = major;
         if start > 0.0 {
-            cold_path();
+            branch();
             begin = major + start * along;
         }
         let way = Way {
@@ -347,10 +346,10 @@ impl<'a> Single<'a> {
         };
         // A branch again: what is foreseen need not be waited for.
         if clearance(2) > way.steps_climb.abs() * 64.0 {
-            cold_path();
+            branch();
             2
         } else if clearance(1) > way.steps_climb.abs() * 8.0 {
-            cold_path();
+            branch();
             1
         } else {
             0
@@ -400,6 +399,12 @@ impl Frame {
 #[derive(Clone, Copy)]
 struct Portable;
 
+/// Keeps the branch that it stands in a branch: the compiler would select, and selecting waits for both sides.
+#[inline(always)]
+fn branch() {
+    std::hint::black_box(());
+}
+
 #[inline(always)]
 fn less(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -447,7 +452,7 @@ impl Looks for Portable {
             } else {
                 (more(crossing, enter), leave, row + 1.0)
             };
-            let patch = if X { [(lane / 2) as i32, row as i32] } else { [row as i32, (lane / 2) as i32] };
+            let patch = if X { [lane / 2, row as i32] } else { [row as i32, lane / 2] };
             let (x, y) = (patch[0] ^ (way.mirror[0] & 3), patch[1] ^ (way.mirror[1] & 3));
             if !(a < b && (0..leaf.patches[0]).contains(&x) && (0..leaf.patches[1]).contains(&y)) {
                 continue;
@@ -566,6 +571,12 @@ mod x86 {
         }
     }
 
+    #[cold]
+    #[inline(never)]
+    fn at_the_border<const X: bool>(land: &Single, way: &Way, cell: [i32; 2]) -> Option<Met> {
+        Portable.patches::<X>(land, way, cell)
+    }
+
     impl Looks for Avx512 {
         #[inline(always)]
         fn nodes<const X: bool>(self, land: &Single, way: &Way, at: At, from: f32, rows: &mut Rows) -> u32 {
@@ -604,6 +615,11 @@ mod x86 {
         #[inline(always)]
         fn patches<const X: bool>(self, land: &Single, way: &Way, cell: [i32; 2]) -> Option<Met> {
             let leaf = Leaf::new::<X>(land, way, cell);
+            // At the map's north and east the samples of fewer patches must do.
+            if leaf.patches != [4, 4] {
+                return at_the_border::<X>(land, way, cell);
+            }
+            let samples = &land.heights[leaf.corner..leaf.corner + 4 * land.columns + 5];
             unsafe {
                 let columns = _mm256_loadu_ps(COLUMNS.as_ptr());
                 let odd = _mm256_setr_ps(0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0);
@@ -624,16 +640,14 @@ mod x86 {
                 let x = _mm256_xor_si256(x, _mm256_set1_epi32(way.mirror[0] & 3));
                 let y = _mm256_xor_si256(y, _mm256_set1_epi32(way.mirror[1] & 3));
                 let valid = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
-                let valid = _mm256_mask_cmplt_epu32_mask(valid, x, _mm256_set1_epi32(leaf.patches[0]));
-                let valid = _mm256_mask_cmplt_epu32_mask(valid, y, _mm256_set1_epi32(leaf.patches[1]));
+                let valid = _mm256_mask_cmplt_epu32_mask(valid, x, _mm256_set1_epi32(4));
+                let valid = _mm256_mask_cmplt_epu32_mask(valid, y, _mm256_set1_epi32(4));
 
-                // Five rows of samples, those that exist.
-                let exists = (1u8 << (leaf.patches[0] + 1)) - 1;
+                // Five rows of five samples.
                 let mut lines = [zero; 5];
                 for (row, line) in lines.iter_mut().enumerate() {
-                    let from = land.heights[leaf.corner + row.min(leaf.patches[1] as usize) * land.columns..].as_ptr();
-                    // SAFETY: patches that exist have samples round them, and the mask lets through no others.
-                    *line = _mm256_maskz_loadu_ps(exists, from);
+                    // SAFETY: the fifth sample of the fifth row is the last of the slice.
+                    *line = _mm256_maskz_loadu_ps(0b11111, samples.as_ptr().add(row * land.columns));
                 }
                 let south = (two(lines[0], lines[1]), two(lines[2], lines[3]));
                 let north = (two(lines[1], lines[2]), two(lines[3], lines[4]));

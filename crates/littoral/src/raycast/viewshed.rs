@@ -3,22 +3,25 @@
 //! Seen from the eye, everything can be projected onto a wall: direction (minor over major offset) against slope (height
 //! over major offset). Straight lines stay straight there, so the ground along a line of the lattice appears as a chain of
 //! straight segments, and the horizon behind which a sample hides is the upper envelope of all that lies before it. The
-//! land is cut into four quarters, each swept outward, one ring (a row or a column) after the other, over narrow bins of
-//! directions; bins are halved as they spread, so that each is about half to one sample wide. For each bin two straight
-//! lines bound the horizon: the *upper* one is the chord over the bin's edges of everything met (an envelope of straight
-//! segments is convex, so it stays below its chord) raised by what a sample within the bin, and the bulge of the saddles
-//! between two rings, can add; the *lower* one is the best single segment. A sample above the upper line is seen if its own
-//! last patch does not hide it, which is computed; one below the lower line is hidden. Between the two remain less than one
-//! in a hundred: these get a line of sight of their own, most often only over the last few strips, since the horizon of a
-//! few rings ago was already cleared. So the answer is that of a line of sight to every sample, at the cost of a sweep.
-//! Rings that lie wholly below the lower line of sixteen bins are skipped at once.
+//! land is cut into eight octants, each swept outward, one ring (a row or a column) after the other, over narrow bins of
+//! directions; bins are halved as they spread, so that each is half to one sample wide. For each bin two straight lines
+//! bound the horizon: the *upper* one is the chord over the bin's edges of everything met (an envelope of straight
+//! segments is convex, so it stays below its chord) raised by what a sample within the bins beside an edge, and the bulge
+//! of the saddles between two rings, can add; the *lower* one is the best single segment. A sample that its own last patch
+//! cannot hide is seen if it is above the upper line; one below the lower line, or behind the ring just before, is hidden.
+//! Between remain about one in a hundred. These are followed back ring by ring, many at once, until the upper line of some
+//! rings ago clears them; what an old crest leaves in doubt, three in a thousand, gets a line of sight of its own over the
+//! rings in question. So the answer is that of a line of sight to every sample, at the cost of a sweep. Rings that lie
+//! wholly below the lower lines of fifteen bins are skipped, sixteen such rings at once before they are even fetched.
 //!
 //! What is new here is the pair of bounds; sweeping a horizon outward is old: W. R. Franklin, C. K. Ray, "Higher isn't
 //! necessarily better: visibility algorithms and experiments", 1994 (R3, R2, Xdraw, all but R3 approximate); M. van
 //! Kreveld, "Variations on sweep algorithms: efficient computation of extended viewsheds and class intervals", 1996.
 
+mod doubt;
 mod frame;
 mod lanes;
+mod marks;
 mod near;
 mod sweep;
 
@@ -27,6 +30,7 @@ use super::{GRAZE, Simd};
 use crate::field::Land;
 use frame::Frame;
 use glam::DVec2;
+use marks::Seen;
 use near::NEAR;
 use rayon::prelude::*;
 
@@ -81,29 +85,9 @@ struct Scene<'a> {
 struct Pending {
     ring: i64,
     minor: i64,
-    /// The ring before which nothing is in the way; 0 when not known.
-    since: i64,
-}
-
-/// The caller's marks, written from many threads, each sample by the one wedge that owns it.
-struct Seen {
-    marks: *mut u8,
-    len: usize,
-}
-
-// SAFETY: wedges partition the samples (every boundary between two is computed by both from the same numbers), so that no
-// two threads write the same byte, and none reads.
-unsafe impl Sync for Seen {}
-
-impl Seen {
-    /// # Safety
-    /// No other thread may mark the same sample.
-    #[inline(always)]
-    unsafe fn mark(&self, index: usize) {
-        debug_assert!(index < self.len);
-        // SAFETY: rings lie within the raster, for which the caller of `viewshed` provided room.
-        unsafe { *self.marks.add(index) = 255 };
-    }
+    /// The rings between which something may be in the way; from 0: anywhere.
+    from: i64,
+    to: i64,
 }
 
 impl Land {
@@ -167,26 +151,13 @@ impl Land {
             return Ok(count);
         }
         let wedges = scene.wedges();
-        let marks = Seen { marks: seen.as_mut_ptr(), len: seen.len() };
-        let decided: Vec<_> = wedges
-            .into_par_iter()
-            .map(|(frame, from, to)| {
-                let found = sweep::sweep(&scene, &frame, from, to, &marks);
-                let free = |pending: &Pending| (*pending, scene.free(&frame, pending));
-                (frame, found.seen, found.pending.iter().map(free).collect::<Vec<_>>())
-            })
-            .collect();
-
-        for (frame, marked, pending) in &decided {
-            count.seen += marked;
-            count.lines += pending.len();
-            for (pending, free) in pending {
-                count.whole_lines += usize::from(pending.since == 0);
-                if *free {
-                    seen[frame.index(frame.major(pending.ring), pending.minor)] = 255;
-                    count.seen += 1;
-                }
-            }
+        let marks = Seen::new(seen);
+        let sweep = |(frame, part, parts)| sweep::sweep(&scene, &frame, part, parts, &marks);
+        let found: Vec<ViewshedCount> = wedges.into_par_iter().map(sweep).collect();
+        for found in found {
+            count.seen += found.seen;
+            count.lines += found.lines;
+            count.whole_lines += found.whole_lines;
         }
         scene.look_around(seen, &mut count);
         count.seen -= scene.forget(seen);
@@ -195,15 +166,18 @@ impl Land {
 }
 
 impl Scene<'_> {
-    /// The land in wedges of directions: quarter by quarter, an eighth of each.
-    fn wedges(&self) -> Vec<(Frame, f64, f64)> {
-        let mut wedges = Vec::with_capacity(32);
-        for (eastward, forward) in [(true, true), (true, false), (false, true), (false, false)] {
-            let frame = Frame::new(self, eastward, forward);
-            wedges.extend((0..8).map(|eighth| {
-                let from = f64::from(eighth) / 4.0 - 1.0;
-                (frame, from, from + 0.25)
-            }));
+    /// The land in wedges of directions: octant by octant, each in so many equal parts that bins, halved as they spread,
+    /// are about one sample wide on the last ring.
+    fn wedges(&self) -> Vec<(Frame, usize, usize)> {
+        let mut wedges = Vec::with_capacity(56);
+        for octant in 0..8 {
+            let frame = Frame::new(self, octant & 4 == 0, octant & 2 == 0, octant & 1 == 0);
+            let mut parts = frame.distance(frame.rings) / (sweep::BINS as f64 * sweep::WIDEST);
+            while parts > 7.0 {
+                parts *= 0.5;
+            }
+            let parts = (parts.ceil() as usize).max(4);
+            wedges.extend((0..parts).map(|part| (frame, part, parts)));
         }
         wedges
     }
@@ -218,18 +192,15 @@ impl Scene<'_> {
     fn free(&self, frame: &Frame, pending: &Pending) -> bool {
         let major = frame.major(pending.ring);
         let index = frame.index(major, pending.minor);
-        let target = if frame.eastward { (major, pending.minor) } else { (pending.minor, major) };
+        let minor = frame.raw_minor(pending.minor);
+        let target = if frame.eastward { (major, minor) } else { (minor, major) };
         let line = self.line(DVec2::new(target.0 as f64, target.1 as f64), index);
-        if pending.since == 0 {
+        if pending.from <= 1 {
             return !line.blocked(self.land);
         }
-        let clear = frame.major(pending.since);
-        // From the sample backwards: what hides it is most often close in front of it.
-        if frame.forward {
-            !(clear..major).rev().any(|strip| line.blocked_in(self.land, strip))
-        } else {
-            !(major..clear).any(|strip| line.blocked_in(self.land, strip))
-        }
+        // The strip that ends at the first of the rings counts.
+        let (from, to) = (frame.major(pending.from - 1), frame.major(pending.to));
+        !line.blocked_between(self.land, from.min(to), from.max(to))
     }
 
     /// Whether heights are so great that single precision could overflow or mean nothing: no land is like that.

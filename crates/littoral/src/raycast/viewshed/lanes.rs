@@ -28,12 +28,39 @@ pub(super) trait Lanes: Copy {
     fn whole(self) -> (Self::Index, Self);
     /// Entry `index` of this table, lane by lane.
     fn lookup(self, index: Self::Index) -> Self;
+    /// Each lane's right-hand neighbour; the last lane keeps its own.
+    fn next(self) -> Self;
+    /// Each lane's left-hand neighbour; the first lane keeps its own.
+    fn previous(self) -> Self;
+    /// The bits of `bits` where `mask` has a one, moved together.
+    fn squeeze(bits: u16, mask: u16) -> u16;
     /// Where this is at most `other`, lowest lane in the lowest bit.
     fn at_most(self, other: Self) -> u16;
     /// `self` where the mask has a one, else `other`.
     fn select(self, mask: u16, other: Self) -> Self;
+    /// Sixteen rows turned into sixteen columns.
+    #[inline(always)]
+    fn turn(rows: [Self; 16]) -> [Self; 16] {
+        let mut table = [[0.0f32; 16]; 16];
+        let mut turned = rows;
+        for (row, lanes) in rows.into_iter().enumerate() {
+            let mut line = [0.0f32; 16];
+            // SAFETY: there is room for sixteen numbers; lanes exist only where their instructions do.
+            unsafe { lanes.store(line.as_mut_ptr()) };
+            for (column, number) in line.into_iter().enumerate() {
+                table[column][row] = number;
+            }
+        }
+        for (row, lanes) in turned.iter_mut().enumerate() {
+            // SAFETY: likewise.
+            *lanes = unsafe { Self::load(table[row].as_ptr()) };
+        }
+        turned
+    }
     /// Asks for a cache line that will be read soon; any address will do.
     fn prefetch(_from: *const f32) {}
+    /// One lane.
+    fn lane(self, lane: usize) -> f32;
     /// The smallest lane.
     fn smallest(self) -> f32;
     /// The greatest lane.
@@ -121,6 +148,28 @@ impl Lanes for Portable {
         result
     }
     #[inline(always)]
+    fn next(self) -> Self {
+        let mut result = self;
+        result.0[..15].copy_from_slice(&self.0[1..]);
+        result
+    }
+    #[inline(always)]
+    fn previous(self) -> Self {
+        let mut result = self;
+        result.0[1..].copy_from_slice(&self.0[..15]);
+        result
+    }
+    #[inline(always)]
+    fn squeeze(bits: u16, mut mask: u16) -> u16 {
+        let (mut result, mut place) = (0, 0);
+        while mask != 0 {
+            result |= (bits >> mask.trailing_zeros() & 1) << place;
+            place += 1;
+            mask &= mask - 1;
+        }
+        result
+    }
+    #[inline(always)]
     fn at_most(self, other: Self) -> u16 {
         let mut mask = 0;
         for lane in 0..16 {
@@ -137,6 +186,10 @@ impl Lanes for Portable {
             }
         }
         result
+    }
+    #[inline(always)]
+    fn lane(self, lane: usize) -> f32 {
+        self.0[lane & 15]
     }
     #[inline(always)]
     fn smallest(self) -> f32 {
@@ -226,12 +279,69 @@ mod x86 {
             Avx512(unsafe { _mm512_permutexvar_ps(index, self.0) })
         }
         #[inline(always)]
+        fn next(self) -> Self {
+            unsafe {
+                let from = _mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 15);
+                Avx512(_mm512_permutexvar_ps(from, self.0))
+            }
+        }
+        #[inline(always)]
+        fn previous(self) -> Self {
+            unsafe {
+                let from = _mm512_setr_epi32(0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14);
+                Avx512(_mm512_permutexvar_ps(from, self.0))
+            }
+        }
+        #[inline(always)]
+        fn squeeze(bits: u16, mask: u16) -> u16 {
+            unsafe { _pext_u32(u32::from(bits), u32::from(mask)) as u16 }
+        }
+        #[inline(always)]
         fn at_most(self, other: Self) -> u16 {
             unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0) }
         }
         #[inline(always)]
         fn select(self, mask: u16, other: Self) -> Self {
             Avx512(unsafe { _mm512_mask_blend_ps(mask, other.0, self.0) })
+        }
+        #[inline(always)]
+        fn lane(self, lane: usize) -> f32 {
+            let mut lanes = [0.0; 16];
+            unsafe { _mm512_storeu_ps(lanes.as_mut_ptr(), self.0) };
+            lanes[lane & 15]
+        }
+        #[inline(always)]
+        fn turn(rows: [Self; 16]) -> [Self; 16] {
+            // Pairs of rows, then of pairs, are interleaved within quarters of a register; then quarters change places.
+            unsafe {
+                let r = rows.map(|row| row.0);
+                let mut s = r;
+                for k in 0..8 {
+                    s[2 * k] = _mm512_unpacklo_ps(r[2 * k], r[2 * k + 1]);
+                    s[2 * k + 1] = _mm512_unpackhi_ps(r[2 * k], r[2 * k + 1]);
+                }
+                let mut t = s;
+                for k in 0..4 {
+                    let [a, b, c, d] = [s[4 * k], s[4 * k + 1], s[4 * k + 2], s[4 * k + 3]];
+                    t[4 * k] = _mm512_shuffle_ps::<0x44>(a, c);
+                    t[4 * k + 1] = _mm512_shuffle_ps::<0xEE>(a, c);
+                    t[4 * k + 2] = _mm512_shuffle_ps::<0x44>(b, d);
+                    t[4 * k + 3] = _mm512_shuffle_ps::<0xEE>(b, d);
+                }
+                let mut result = rows;
+                for k in 0..4 {
+                    let (a, b) = (t[k], t[k + 4]);
+                    let (c, d) = (t[k + 8], t[k + 12]);
+                    let (even_low, odd_low) = (_mm512_shuffle_f32x4::<0x88>(a, b), _mm512_shuffle_f32x4::<0xDD>(a, b));
+                    let (even_high, odd_high) =
+                        (_mm512_shuffle_f32x4::<0x88>(c, d), _mm512_shuffle_f32x4::<0xDD>(c, d));
+                    result[k] = Avx512(_mm512_shuffle_f32x4::<0x88>(even_low, even_high));
+                    result[k + 8] = Avx512(_mm512_shuffle_f32x4::<0xDD>(even_low, even_high));
+                    result[k + 4] = Avx512(_mm512_shuffle_f32x4::<0x88>(odd_low, odd_high));
+                    result[k + 12] = Avx512(_mm512_shuffle_f32x4::<0xDD>(odd_low, odd_high));
+                }
+                result
+            }
         }
         #[inline(always)]
         fn smallest(self) -> f32 {
@@ -310,6 +420,26 @@ mod x86 {
             unsafe { Avx2(lookup_half(self, index.0), lookup_half(self, index.1)) }
         }
         #[inline(always)]
+        fn next(self) -> Self {
+            unsafe {
+                let (one, last) = (_mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 7), _mm256_setzero_si256());
+                let (low, high) = (_mm256_permutevar8x32_ps(self.0, one), _mm256_permutevar8x32_ps(self.1, one));
+                Avx2(_mm256_blend_ps::<0x80>(low, _mm256_permutevar8x32_ps(self.1, last)), high)
+            }
+        }
+        #[inline(always)]
+        fn previous(self) -> Self {
+            unsafe {
+                let (one, first) = (_mm256_setr_epi32(0, 0, 1, 2, 3, 4, 5, 6), _mm256_set1_epi32(7));
+                let (low, high) = (_mm256_permutevar8x32_ps(self.0, one), _mm256_permutevar8x32_ps(self.1, one));
+                Avx2(low, _mm256_blend_ps::<0x01>(high, _mm256_permutevar8x32_ps(self.0, first)))
+            }
+        }
+        #[inline(always)]
+        fn squeeze(bits: u16, mask: u16) -> u16 {
+            unsafe { _pext_u32(u32::from(bits), u32::from(mask)) as u16 }
+        }
+        #[inline(always)]
         fn at_most(self, other: Self) -> u16 {
             unsafe {
                 let a = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0));
@@ -320,6 +450,12 @@ mod x86 {
         #[inline(always)]
         fn select(self, mask: u16, other: Self) -> Self {
             unsafe { Avx2(select_half(mask & 255, self.0, other.0), select_half(mask >> 8, self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn lane(self, lane: usize) -> f32 {
+            let mut lanes = [0.0; 16];
+            unsafe { self.store(lanes.as_mut_ptr()) };
+            lanes[lane & 15]
         }
         #[inline(always)]
         fn smallest(self) -> f32 {

@@ -3,17 +3,17 @@
 
 use super::Scene;
 use super::frame::{Frame, NOTHING};
-use super::sweep::Bins;
+use super::sweep::{BINS, Bins};
 use crate::raycast::GRAZE;
 
 /// How many rings are near.
 pub(super) const NEAR: i64 = 4;
 
-/// The horizon over the near rings for sixteen bins of directions from `t0` on, each `dt` wide.
-pub(super) fn near_horizon(scene: &Scene, frame: &Frame, t0: f64, dt: f64) -> Bins {
+/// The horizon over the near rings for the bins between neighbouring directions of `edges`.
+pub(super) fn near_horizon(scene: &Scene, frame: &Frame, edges: &[f64; BINS + 1]) -> Bins {
     let mut bins = Bins::open();
-    for bin in 0..16 {
-        let (left, right) = (t0 + bin as f64 * dt, t0 + (bin + 1) as f64 * dt);
+    for bin in 0..BINS {
+        let (left, right) = (edges[bin], edges[bin + 1]);
         let mut horizon = Horizon::default();
         for ring in 1..=NEAR.min(frame.rings) {
             let strip = Strip { scene, frame, ring };
@@ -35,12 +35,12 @@ pub(super) fn near_horizon(scene: &Scene, frame: &Frame, t0: f64, dt: f64) -> Bi
         // Rounded outward: what is stored stays a bound.
         let up = |value: f64| (value + value.abs() * 2e-7) as f32;
         let down = |value: f64| (value - value.abs() * 2e-7) as f32;
-        bins.upper_left[bin] = up(horizon.upper[0]);
-        bins.upper_right[bin] = up(horizon.upper[1]);
+        for side in 0..2 {
+            bins.upper[bin + side] = bins.upper[bin + side].max(up(horizon.upper[side]));
+            bins.last[bin + side] = bins.last[bin + side].max(up(horizon.last[side]));
+        }
         bins.lower_left[bin] = down(horizon.lower[0]);
         bins.lower_right[bin] = down(horizon.lower[1]);
-        bins.last_left[bin] = up(horizon.last[0]);
-        bins.last_right[bin] = up(horizon.last[1]);
     }
     bins.settle();
     bins
