@@ -3,15 +3,45 @@
 use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DAffine2, DVec2};
 use littoral::field::{Land, Raster, Window};
-use littoral_data::{Crs, Dem, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
+use littoral_data::{Code, Crs, Dem, Encoding, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
 use std::path::{Path, PathBuf};
 
-/// An opened height file.
+/// How files are read, where they do not say it themselves.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct Reading {
+    /// What the pixels of a PNG mean [default: told from the heights that they give]
+    #[arg(long, value_enum, value_name = "ENCODING")]
+    encoding: Option<EncodingName>,
+}
+
+/// What the pixels of a PNG mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum EncodingName {
+    /// 256 R + G + B/256 - 32768 metres
+    Terrarium,
+    /// -10000 + 0.1 (65536 R + 256 G + B) metres, Terrain-RGB
+    Mapbox,
+    /// Greys are metres
+    Grey,
+}
+
+impl EncodingName {
+    fn encoding(self) -> Encoding {
+        match self {
+            EncodingName::Terrarium => Encoding::Code(Code::Terrarium),
+            EncodingName::Mapbox => Encoding::Code(Code::TerrainRgb),
+            EncodingName::Grey => Encoding::Grey,
+        }
+    }
+}
+
+/// An opened height file, or several as one.
 pub struct Opened {
-    /// Its name.
+    /// Its name, or what stands for all of theirs.
     pub file: PathBuf,
     /// How its coordinates and local metres belong together.
     pub frame: Frame,
+    several: bool,
     source: Box<dyn Source>,
 }
 
@@ -42,10 +72,15 @@ impl System {
 
 impl Opened {
     /// Opens a file and passes on what its reader noticed.
-    pub fn open(file: &Path, talk: &mut Talk) -> Result<Opened, Failure> {
-        let source = littoral_data::open(file)?;
-        let info = source.info();
-        let opened = Opened { file: file.to_owned(), frame: Frame::of(&info.georeference), source };
+    pub fn open(file: &Path, reading: Reading, talk: &mut Talk) -> Result<Opened, Failure> {
+        Opened::open_all(&[file.to_owned()], reading, talk)
+    }
+
+    /// Opens files as one, and passes on what their readers noticed.
+    pub fn open_all(files: &[PathBuf], reading: Reading, talk: &mut Talk) -> Result<Opened, Failure> {
+        let source = littoral_data::open_all(files, reading.encoding.map(EncodingName::encoding))?;
+        let frame = Frame::of(&source.info().georeference);
+        let opened = Opened { file: littoral_data::name_of_all(files), frame, several: files.len() > 1, source };
         opened.pass_on(&opened.info().warnings.clone(), talk);
         opened.pass_on(&opened.info().georeference.warnings(), talk);
         Ok(opened)
@@ -54,7 +89,8 @@ impl Opened {
     /// Warns of what came up since.
     fn pass_on(&self, warnings: &[String], talk: &mut Talk) {
         for warning in warnings {
-            talk.warn(format!("{}: {warning}", self.file.display()));
+            // Those of several files name theirs.
+            talk.warn(if self.several { warning.clone() } else { format!("{}: {warning}", self.file.display()) });
         }
     }
 
@@ -89,15 +125,7 @@ impl Opened {
         let mut heights = self.source.read(0, window)?;
         self.pass_on(&self.info().warnings.clone(), talk);
         let [flip_columns, flip_rows] = self.frame.georeference.flips();
-        if flip_rows {
-            for row in 0..rows / 2 {
-                let (upper, lower) = heights.split_at_mut((rows - 1 - row) * columns);
-                upper[row * columns..(row + 1) * columns].swap_with_slice(&mut lower[..columns]);
-            }
-        }
-        if flip_columns {
-            heights.chunks_exact_mut(columns).for_each(<[f32]>::reverse);
-        }
+        self.frame.georeference.turn(&mut heights, columns);
         let raster =
             Raster::new(columns, rows, self.frame.spacing(), heights).map_err(|e| self.failure(&e.to_string()))?;
         let column = if flip_columns { window.column + columns - 1 } else { window.column };

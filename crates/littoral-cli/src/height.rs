@@ -1,6 +1,6 @@
 //! `littoral height`: exact heights at points.
 
-use crate::ground::{Opened, System, height_at};
+use crate::ground::{Opened, Reading, System, height_at};
 use crate::input;
 use crate::talk::{Failure, Talk, written};
 use glam::DVec2;
@@ -36,6 +36,8 @@ pub struct Height {
     /// Also the surface's unit normals
     #[arg(long)]
     normals: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 /// A point and how it was written.
@@ -75,7 +77,7 @@ struct Misses {
 impl Height {
     /// Runs the command.
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
-        let mut opened = Opened::open(&self.file, talk)?;
+        let mut opened = Opened::open(&self.file, self.reading, talk)?;
         let system = System::of(self.lonlat);
         let mut misses = Misses::default();
         let mut answer = Answer { heights: Vec::new(), normals: self.normals.then(Vec::new) };

@@ -1,6 +1,6 @@
 //! `littoral info`: what a file is, and what is assumed about it.
 
-use crate::ground::Opened;
+use crate::ground::{Opened, Reading};
 use crate::talk::{Failure, Talk, tidy};
 use littoral_data::{Crs, Registration, VerticalDatum, name_of_unit};
 use serde::Serialize;
@@ -18,6 +18,8 @@ use std::path::PathBuf;
 pub struct Info {
     /// A height file of any known format
     file: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 #[derive(Serialize)]
@@ -46,7 +48,7 @@ struct Answer<'a> {
 impl Info {
     /// Runs the command.
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
-        let mut opened = Opened::open(&self.file, talk)?;
+        let mut opened = Opened::open(&self.file, self.reading, talk)?;
         let survey = opened.survey(talk)?;
         if survey.min.is_none() {
             talk.warn(format!("{}: no valid height: all {} samples are void", self.file.display(), survey.void));

@@ -1,6 +1,6 @@
 //! `littoral profile`: heights along a line.
 
-use crate::ground::{Opened, System};
+use crate::ground::{Opened, Reading, System};
 use crate::input;
 use crate::plot::{self, Plot};
 use crate::talk::{Failure, Talk, tidy};
@@ -45,6 +45,8 @@ pub struct Profile {
     /// Size of a plot in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = input::size, default_value = "1280x480")]
     size: UVec2,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 #[derive(Serialize)]
@@ -65,7 +67,7 @@ impl Profile {
     /// Runs the command.
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
         let ending = self.out.as_deref().map(|out| plot::ending(out, &["csv", "svg", "png"])).transpose()?;
-        let mut opened = Opened::open(&self.file, talk)?;
+        let mut opened = Opened::open(&self.file, self.reading, talk)?;
         let system = System::of(self.lonlat);
         let (from, to) = (opened.local(system, self.from)?, opened.local(system, self.to)?);
         if from == to {

@@ -1,7 +1,7 @@
 //! `littoral render`: pictures and films.
 
 use crate::film;
-use crate::ground::{Frame, Opened, System, height_at};
+use crate::ground::{Frame, Opened, Reading, System, height_at};
 use crate::input::{self, Target, WaterLevel};
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
@@ -22,6 +22,7 @@ use std::time::Instant;
 #[command(after_help = "Examples:
   littoral render                                          the built-in coast, into littoral.png
   littoral render dem.tif                                  your land, from a view chosen by itself
+  littoral render N45W122.hgt N46W122.hgt                  files that join, as one land
   littoral render dem.tif --sun 240,12 --size 1920x1080 --out evening.png
   littoral render dem.tif --eye 562300,5107000,3200 --look 562300,5115800,1900
   littoral render dem.tif --eye 562300,5109500,2 --look 562300,5115800 --above
@@ -34,9 +35,12 @@ use std::time::Instant;
 A film ending in .mp4 needs ffmpeg and is written when it is complete. A film whose --out is a folder is written frame
 by frame: when interrupted, the same command goes on where it stopped.")]
 pub struct Render {
-    /// A height file of any known format; none for the built-in coast
+    /// Height files of any known format: several that lie beside or over each other, in one coordinate system, are drawn as
+    /// one; none for the built-in coast
     #[arg(value_name = "FILE")]
     files: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
     /// The file to write: .png, .exr (linear light); for films .mp4, .mov, .mkv or a folder for frames
     /// [default: littoral.png, littoral.mp4]
     #[arg(long, short, value_name = "FILE")]
@@ -181,17 +185,16 @@ impl Render {
     pub fn run(mut self, talk: &mut Talk) -> Result<(), Failure> {
         let started = Instant::now();
         self.untangle()?;
-        let file = self.files.first().cloned();
         let out = self.output()?;
-        let inputs: Vec<&Path> =
-            [file.as_deref(), self.texture.as_deref(), self.path.as_deref()].into_iter().flatten().collect();
+        let files = self.files.iter().map(PathBuf::as_path);
+        let inputs: Vec<&Path> = files.chain(self.texture.as_deref()).chain(self.path.as_deref()).collect();
         check_output(&out.file, &inputs)?;
         if let Some(save) = &self.save_path {
             check_output(save, &inputs)?;
         }
 
-        let subject = self.subject(file.as_deref(), talk)?;
-        let (shot, look) = self.shot(&subject, file.is_none(), talk)?;
+        let subject = self.subject(talk)?;
+        let (shot, look) = self.shot(&subject, self.files.is_empty(), talk)?;
         let drape = self.texture.as_ref().map(|texture| drape(texture, &subject, talk)).transpose()?;
         let scene = Scene {
             drape: drape.as_ref(),
@@ -267,10 +270,6 @@ impl Render {
             self.files.push(path.clone());
             self.path = Some("orbit".into());
         }
-        if let [_, second, ..] = &self.files[..] {
-            let second = second.display();
-            return Err(Failure::Usage(format!("{second}: expected one height file, got several; name only one")));
-        }
         match (self.style, &self.texture) {
             (Some(StyleName::Image), None) => {
                 Err(Failure::Usage("expected a picture for --style image, got none; add --texture IMAGE".into()))
@@ -324,14 +323,14 @@ impl Render {
         Ok(Output { file: out.clone(), kind })
     }
 
-    fn subject(&self, file: Option<&Path>, talk: &mut Talk) -> Result<Subject, Failure> {
-        let (name, land, frame, datum) = match file {
-            None => {
+    fn subject(&self, talk: &mut Talk) -> Result<Subject, Failure> {
+        let (name, land, frame, datum) = match &self.files[..] {
+            [] => {
                 ("the built-in coast".to_owned(), coast::coast(), Frame::metres(), "heights above its sea level".into())
             }
-            Some(file) => {
-                let (land, frame, datum) = self.loaded(file, talk)?;
-                (file.display().to_string(), land, frame, datum)
+            files => {
+                let (land, frame, datum) = self.loaded(files, talk)?;
+                (littoral_data::name_of_all(files).display().to_string(), land, frame, datum)
             }
         };
         let land = match self.exaggeration {
@@ -349,8 +348,8 @@ impl Render {
     }
 
     /// Land at a resolution that fits a picture.
-    fn loaded(&self, file: &Path, talk: &mut Talk) -> Result<(Land, Frame, String), Failure> {
-        let mut opened = Opened::open(file, talk)?;
+    fn loaded(&self, files: &[PathBuf], talk: &mut Talk) -> Result<(Land, Frame, String), Failure> {
+        let mut opened = Opened::open_all(files, self.reading, talk)?;
         let (land, frame) = opened.fitting(if self.full { usize::MAX } else { FITTING }, talk)?;
         Ok((land, frame, opened.datum()))
     }

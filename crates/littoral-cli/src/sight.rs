@@ -1,6 +1,6 @@
 //! `littoral sight`: whether two points see each other.
 
-use crate::ground::{Opened, System};
+use crate::ground::{Opened, Reading, System};
 use crate::input;
 use crate::talk::{Failure, Talk, tidy};
 use glam::{DVec2, DVec3};
@@ -31,6 +31,8 @@ pub struct Sight {
     lonlat: bool,
     #[command(flatten)]
     curved: Curved,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 /// The Earth's curvature, for whoever looks far.
@@ -83,7 +85,7 @@ struct Obstacle {
 impl Sight {
     /// Runs the command.
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
-        let mut opened = Opened::open(&self.file, talk)?;
+        let mut opened = Opened::open(&self.file, self.reading, talk)?;
         let system = System::of(self.lonlat);
         let (from, to) = (opened.local(system, self.from.truncate())?, opened.local(system, self.to.truncate())?);
         let land = opened.part(opened.window_of([from, to]), talk)?;

@@ -1,6 +1,6 @@
 //! `littoral viewshed`: what is seen from a point.
 
-use crate::ground::{Opened, System};
+use crate::ground::{Opened, Reading, System};
 use crate::input;
 use crate::plot::ending;
 use crate::sight::{Curved, explained};
@@ -45,6 +45,8 @@ pub struct Viewshed {
     lonlat: bool,
     #[command(flatten)]
     curved: Curved,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 #[derive(Serialize)]
@@ -66,7 +68,7 @@ impl Viewshed {
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
         ending(&self.out, &["tif", "tiff"])?;
         crate::render::check_output(&self.out, &[&self.file])?;
-        let mut opened = Opened::open(&self.file, talk)?;
+        let mut opened = Opened::open(&self.file, self.reading, talk)?;
         let started = Instant::now();
         let system = System::of(self.lonlat);
         let from = opened.local(system, self.from.truncate())?;
@@ -92,16 +94,11 @@ impl Viewshed {
             }
         }
         // Into the file's order, and the whole file's size.
-        let [flip_columns, flip_rows] = info.georeference.flips();
+        info.georeference.turn(&mut seen, window.columns);
         let mut grid = vec![0; columns * rows];
-        for row in 0..window.rows {
-            let line = if flip_rows { window.rows - 1 - row } else { row };
+        for (row, line) in seen.chunks_exact(window.columns).enumerate() {
             let into = (window.row + row) * columns + window.column;
-            let into = &mut grid[into..into + window.columns];
-            into.copy_from_slice(&seen[line * window.columns..(line + 1) * window.columns]);
-            if flip_columns {
-                into.reverse();
-            }
+            grid[into..into + window.columns].copy_from_slice(line);
         }
         let void = raster.voids().count();
         let note = format!(

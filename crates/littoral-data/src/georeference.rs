@@ -179,6 +179,21 @@ impl Georeference {
         }
     }
 
+    /// Turns samples of `columns` a row from the file's order into the local one, west to east and south to north, or back.
+    pub fn turn<T>(&self, samples: &mut [T], columns: usize) {
+        let [flip_columns, flip_rows] = self.flips();
+        let rows = samples.len() / columns.max(1);
+        if flip_rows {
+            for row in 0..rows / 2 {
+                let (upper, lower) = samples.split_at_mut((rows - 1 - row) * columns);
+                upper[row * columns..(row + 1) * columns].swap_with_slice(&mut lower[..columns]);
+            }
+        }
+        if flip_columns {
+            samples.chunks_exact_mut(columns).for_each(<[T]>::reverse);
+        }
+    }
+
     /// The angle (rad) from the local y axis to the file's y axis (grid north), counter-clockwise positive: grid north
     /// lies along (−sin, cos) of it. Zero for grids that are not rotated.
     pub fn grid_north(&self) -> f64 {

@@ -33,6 +33,7 @@ mod error;
 pub mod formats;
 mod georeference;
 mod image;
+mod mosaic;
 pub mod path;
 mod reduce;
 mod source;
@@ -44,8 +45,10 @@ pub mod write;
 pub use crate::image::{BEHIND, Image, image_from, open_image};
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};
 pub use error::Error;
+pub use formats::tiles::{Code, Encoding};
 pub use georeference::{Georeference, Registration, metres_per_degree};
+pub use mosaic::{Mosaic, name_of_all, open_all};
 pub use source::{
-    Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, load_from, load_window, open,
+    Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, load_from, load_window, open, open_as,
 };
 pub use survey::{Survey, survey};

@@ -1,5 +1,6 @@
 //! What a reader offers, and how a file becomes land.
 
+use crate::formats::tiles::Encoding;
 use crate::reduce::Reducer;
 use crate::{Error, Georeference, formats};
 use littoral::field::{Raster, Window};
@@ -118,6 +119,16 @@ impl Source for MemorySource {
 /// If the file cannot be read, is of no known format, or is broken.
 pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
     formats::open(file)
+}
+
+/// As [`open`], and the pixels of a PNG in this encoding; `None` to tell it from the heights that they give.
+///
+/// # Errors
+/// As [`open`]; also if the file is no PNG, or its pixels cannot be in that encoding.
+pub fn open_as(file: &Path, encoding: Option<Encoding>) -> Result<Box<dyn Source>, Error> {
+    let mut input = formats::Input::file(file)?;
+    input.encoding = encoding;
+    formats::open_input(input)
 }
 
 /// How much of a file to load.
@@ -258,16 +269,7 @@ fn finish(source: &dyn Source, file: &Path, georeference: Georeference, mut heig
         return Err(Error::content(file, "expected at least one valid height, got only voids"));
     }
     let [columns, rows] = georeference.size;
-    let [flip_columns, flip_rows] = georeference.flips();
-    if flip_rows {
-        for row in 0..rows / 2 {
-            let (upper, lower) = heights.split_at_mut((rows - 1 - row) * columns);
-            upper[row * columns..(row + 1) * columns].swap_with_slice(&mut lower[..columns]);
-        }
-    }
-    if flip_columns {
-        heights.chunks_exact_mut(columns).for_each(<[f32]>::reverse);
-    }
+    georeference.turn(&mut heights, columns);
     info.warnings.extend(georeference.warnings());
     let raster = Raster::new(columns, rows, georeference.spacing(), heights)
         .map_err(|error| Error::content(file, error.to_string()))?;

@@ -387,6 +387,79 @@ fn an_alpha_band_and_a_mask_say_what_is_void() {
     same(&all(&mut *open(bytes), 0), expected);
 }
 
+/// A mask beside a file: void at every third sample.
+fn thirds(columns: usize, rows: usize) -> Maker {
+    let mut mask = Maker::new(columns, rows);
+    (mask.kind, mask.compression) = ((1, 8), 8);
+    mask.values = (0..columns * rows).map(|i| if i % 3 == 0 { 0.0 } else { 255.0 }).collect();
+    mask
+}
+
+#[test]
+fn a_mask_beside_the_file_says_what_is_void() {
+    let mut maker = Maker::new(20, 12);
+    maker.values = (0..240).map(f64::from).collect();
+    let mut half = Maker::new(10, 6);
+    half.tags.push((254, 4, vec![1, 0, 0, 0], 1));
+    let file = || Input::memory("made.tif", maker.file(&[half.clone()]));
+    let opened = |input| tiff::open_input(input).expect("opens");
+    let masked = |value: &f64| if (*value as usize).is_multiple_of(3) { f64::NAN } else { *value };
+
+    let mut source = opened(file().with_sidecar("msk", thirds(20, 12).file(&[])));
+    same(&all(&mut *source, 0), maker.values.iter().map(masked));
+    assert_eq!((source.levels().len(), &source.info().warnings), (1, &vec![]), "a level without its mask is not shown");
+    // The mask's own overview makes the coarser level good again.
+    let both = file().with_sidecar("msk", thirds(20, 12).file(&[])).with_sidecar("msk.ovr", thirds(10, 6).file(&[]));
+    let mut source = opened(both);
+    let coarse = all(&mut *source, 1);
+    assert_eq!(coarse.iter().filter(|height| height.is_nan()).count(), 20);
+    // Another size is another file's; a broken one is said to be.
+    let mut source = opened(file().with_sidecar("msk", thirds(19, 12).file(&[])));
+    same(&all(&mut *source, 0), maker.values.iter().copied());
+    assert_eq!(source.levels().len(), 2);
+    for broken in [Vec::new(), b"II*\0".to_vec(), vec![0; 100], thirds(20, 12).file(&[])[..20].to_vec()] {
+        let source = opened(file().with_sidecar("msk", broken));
+        assert!(source.info().warnings[0].contains(".msk beside the file is left out"), "{:?}", source.info().warnings);
+    }
+    // A mask cut off is void where it is missing.
+    let cut = thirds(20, 12).file(&[]);
+    let mut source = opened(
+        file().with_sidecar("msk", cut.iter().enumerate().map(|(i, &b)| if i == 12 { !b } else { b }).collect()),
+    );
+    assert!(all(&mut *source, 0).iter().any(|height| height.is_nan()) && !source.info().warnings.is_empty());
+}
+
+#[test]
+fn gdals_notes_beside_the_file_are_read() {
+    let mut maker = Maker::new(8, 6);
+    maker.values = (0..48).map(f64::from).collect();
+    maker.text(42113, "3");
+    let notes = "<PAMDataset><SRS></SRS><GeoTransform>500, 10, 0, 900, 0, -10</GeoTransform>\
+        <Metadata><MDI key=\"AREA_OR_POINT\">Point</MDI></Metadata><PAMRasterBand band=\"1\"><NoDataValue>7</NoDataValue>\
+        <Scale>2</Scale><Offset>1</Offset><UnitType>cm</UnitType></PAMRasterBand></PAMDataset>";
+    let mut source =
+        tiff::open_input(Input::memory("made.tif", maker.file(&[])).with_sidecar("aux.xml", notes.as_bytes().to_vec()))
+            .expect("opens");
+    let height = |value: f64| if value == 7.0 { f64::NAN } else { (value * 2.0 + 1.0) * 0.01 };
+    same(&all(&mut *source, 0), maker.values.iter().map(|&value| height(value)));
+    let info = source.info();
+    assert_eq!(info.georeference.geotransform, [500.0, 10.0, 0.0, 900.0, 0.0, -10.0]);
+    assert_eq!((info.nodata, info.georeference.registration), (Some(7.0), littoral_data::Registration::Point));
+    assert_eq!(info.warnings, [""; 0]);
+    let broken = Input::memory("made.tif", maker.file(&[])).with_sidecar("aux.xml", b"<PAMDataset><".to_vec());
+    let mut source = tiff::open_input(broken).expect("opens");
+    same(&all(&mut *source, 0), maker.values.iter().map(|&value| if value == 3.0 { f64::NAN } else { value }));
+    assert!(source.info().warnings[0].contains("left aside"));
+    // On disk they stand behind the whole name; another file's do not count.
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("made.tif"), maker.file(&[])).expect("written");
+    std::fs::write(folder.path().join("made.aux.xml"), notes).expect("written");
+    let nodata = || littoral_data::open(&folder.path().join("made.tif")).expect("opens").info().nodata;
+    assert_eq!(nodata(), Some(3.0));
+    std::fs::rename(folder.path().join("made.aux.xml"), folder.path().join("made.tif.aux.xml")).expect("renamed");
+    assert_eq!(nodata(), Some(7.0));
+}
+
 #[test]
 fn no_data_scale_unit_and_place_are_read() {
     let mut maker = Maker::new(8, 6);

@@ -12,4 +12,6 @@ libfuzzer_sys::fuzz_target!(|data: &[u8]| {
     let beside = |extension| input(&name, content).with_sidecar(extension, sidecar.to_vec());
     check(formats::open_input(beside("hdr")));
     check(formats::open_input(beside("prj").with_sidecar("wld", sidecar.to_vec())));
+    check(formats::open_input(beside("aux.xml")));
+    check(formats::open_input(beside("msk")));
 });

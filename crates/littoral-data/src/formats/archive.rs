@@ -1,7 +1,7 @@
 //! Height files packed by `gzip` or into a `.zip` with one height file: unpacked in memory, up to a limit, and opened as
 //! what is inside. Companions of the same archive (`.hdr`, `.prj`, world files) come along.
 
-use super::Input;
+use super::{Input, input::APPENDED};
 use crate::Error;
 use std::io::Read;
 use std::path::Path;
@@ -100,6 +100,13 @@ pub fn unpack_zip(mut input: Input) -> Result<Input, Error> {
             unpacked = unpacked.with_sidecar(&extension(file), content);
         }
     }
+    // Those that stand behind the whole name. A mask may be as long as the file itself.
+    for ending in APPENDED {
+        if let Some(file) = files.iter().find(|n| n.strip_prefix(found.as_str()) == Some(&format!(".{ending}"))) {
+            let content = unpack(archive.by_name(file).map_err(fails)?, &name)?;
+            unpacked = unpacked.with_sidecar(ending, content);
+        }
+    }
     Ok(unpacked)
 }
 
@@ -145,6 +152,11 @@ mod tests {
         let unpacked = unpack_zip(Input::memory("x.zip", bytes)).expect("unpacks");
         assert_eq!(unpacked.lower_name(), "land.asc");
         assert_eq!(unpacked.sidecar_text("prj").as_deref(), Some("text"));
+        let files =
+            [("a/land.asc", GRID), ("a/land.asc.aux.xml", b"<a/>"), ("b/land.asc.msk", b"1"), ("a/land.asc.msk", b"2")];
+        let unpacked = unpack_zip(Input::memory("x.zip", zip(&files))).expect("unpacks");
+        assert_eq!(unpacked.sidecar_text("aux.xml").as_deref(), Some("<a/>"));
+        assert_eq!(unpacked.sidecar_text("msk").as_deref(), Some("2"));
         let two = zip(&[("a.asc", GRID), ("b.asc", GRID)]);
         assert!(unpack_zip(Input::memory("x.zip", two)).err().expect("two").to_string().contains("got 2"));
         let none = zip(&[("a.doc", GRID), ("b.doc", GRID)]);

@@ -1,5 +1,6 @@
 //! A file's bytes, wherever they lie: on disk, inside an archive, or in memory for tests and fuzzers.
 
+use super::tiles::Encoding;
 use crate::Error;
 use std::ffi::OsString;
 use std::fs::File;
@@ -10,10 +11,15 @@ use std::sync::Arc;
 /// No companion file (header, projection, world file) is longer; what is longer is something else of the same name.
 const LONGEST_SIDECAR: u64 = 1 << 20;
 
+/// Companions that stand behind the whole name only, `land.tif.msk`: `land.msk` belongs to some other file.
+pub(super) const APPENDED: [&str; 3] = ["aux.xml", "msk", "msk.ovr"];
+
 /// An opened file and what lies beside it. Every reader takes one.
 pub struct Input {
     /// The file's name: shown in messages, and a hint for formats that keep their place or size in it.
     pub name: PathBuf,
+    /// What the pixels of a PNG mean; `None` to tell it from the heights that they give.
+    pub encoding: Option<Encoding>,
     length: u64,
     bytes: Bytes,
     beside: Vec<(String, Vec<u8>)>,
@@ -40,13 +46,19 @@ impl Input {
         }
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         let bytes = Bytes::Disk(file);
-        Ok(Input { name: path.to_owned(), length: metadata.len(), bytes, beside: Vec::new() })
+        Ok(Input { name: path.to_owned(), encoding: None, length: metadata.len(), bytes, beside: Vec::new() })
     }
 
     /// Bytes in memory under a name. Companion files are only those added by [`Input::with_sidecar`].
     pub fn memory(name: impl Into<PathBuf>, bytes: Vec<u8>) -> Input {
         let length = bytes.len() as u64;
-        Input { name: name.into(), length, bytes: Bytes::Memory(Cursor::new(bytes)), beside: Vec::new() }
+        Input {
+            name: name.into(),
+            encoding: None,
+            length,
+            bytes: Bytes::Memory(Cursor::new(bytes)),
+            beside: Vec::new(),
+        }
     }
 
     /// Adds a companion file by its extension in lower case and without the dot, such as `hdr` or `prj`.
@@ -156,13 +168,26 @@ impl Input {
     /// Where the companion of this extension lies on disk, if there is one.
     pub fn sidecar_path(&self, extension: &str) -> Option<PathBuf> {
         let Bytes::Disk(_) = self.bytes else { return None };
+        let appended_only = APPENDED.contains(&extension);
         let mut paths = [extension.to_owned(), extension.to_uppercase()].into_iter().flat_map(|extension| {
             let mut appended = OsString::from(&self.name);
             appended.push(".");
             appended.push(&extension);
-            [self.name.with_extension(&extension), PathBuf::from(appended)]
+            let instead = (!appended_only).then(|| self.name.with_extension(&extension));
+            instead.into_iter().chain([PathBuf::from(appended)])
         });
         paths.find(|path| *path != self.name && path.is_file())
+    }
+
+    /// All bytes of a companion, to be read at any place; `None` if there is none.
+    ///
+    /// # Errors
+    /// If it is there and cannot be opened.
+    pub(crate) fn sidecar_bytes(&self, extension: &str) -> std::io::Result<Option<crate::bytes::Bytes>> {
+        if let Some((_, content)) = self.beside.iter().find(|(name, _)| name == extension) {
+            return Ok(Some(crate::bytes::Bytes::Memory(content.clone())));
+        }
+        self.sidecar_path(extension).map(|path| crate::bytes::Bytes::open(&path)).transpose()
     }
 
     /// The companion of this extension as text.

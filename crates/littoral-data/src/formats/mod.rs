@@ -12,6 +12,7 @@ pub mod hgt;
 mod input;
 pub mod named_raw;
 pub mod netcdf;
+pub(crate) mod pam;
 pub mod png;
 pub mod raw;
 pub mod surfer;
@@ -44,11 +45,18 @@ pub fn open(file: &Path) -> Result<Box<dyn Source>, Error> {
 /// # Errors
 /// As [`open`].
 pub fn open_input(mut input: Input) -> Result<Box<dyn Source>, Error> {
-    let head = input.head(HEAD)?;
+    let (head, encoding) = (input.head(HEAD)?, input.encoding);
     if archive::is_gzip(&head) {
         input = archive::unpack_gzip(input)?;
     } else if archive::is_zip(&head) {
         input = archive::unpack_zip(input)?;
+    }
+    input.encoding = encoding;
+    let head = input.head(HEAD)?;
+    if encoding.is_some() && !png::sniff(&head) {
+        return Err(
+            input.error("expected a PNG, whose encoding can be chosen, got another format; leave the choice out")
+        );
     }
     open_unpacked(input)
 }
@@ -193,18 +201,22 @@ pub(crate) fn check_size_fits(
     })
 }
 
-/// The coordinate system of the `.prj` beside a file.
+/// The coordinate system of the `.prj` beside a file, or of its `.aux.xml`.
 pub(crate) fn crs_from_sidecar(input: &Input) -> Crs {
-    input.sidecar_text("prj").map_or(Crs::Unknown, |text| Crs::from_wkt(&text))
+    let projection = input.sidecar_text("prj").map(|text| Crs::from_wkt(&text)).filter(|crs| *crs != Crs::Unknown);
+    projection.or_else(|| pam::Notes::beside(input).crs).unwrap_or(Crs::Unknown)
 }
 
-/// What a world file of one of these extensions and a `.prj` beside the file say.
+/// What an `.aux.xml`, a world file of one of these extensions and a `.prj` beside the file say.
 pub(crate) fn georeference_beside(input: &Input, columns: usize, rows: usize, extensions: &[&str]) -> Georeference {
     let world = extensions.iter().find_map(|extension| input.sidecar_text(extension));
     let mut georeference = Georeference { crs: crs_from_sidecar(input), ..Georeference::none(columns, rows) };
-    if let Some(geotransform) = world.and_then(|text| Georeference::geotransform_of_world_file(&text)) {
+    let notes = pam::Notes::beside(input);
+    let world = world.and_then(|text| Georeference::geotransform_of_world_file(&text));
+    if let Some(geotransform) = notes.geotransform.or(world) {
         georeference.geotransform = geotransform;
         georeference.y_south = false;
+        georeference.registration = notes.registration.unwrap_or(georeference.registration);
     }
     georeference
 }

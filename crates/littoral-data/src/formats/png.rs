@@ -2,9 +2,8 @@
 //! [`tiles`]). Gamma, colour profiles and the "transparent grey" chunk are left aside: they belong to
 //! pictures, and programs write zero, the sea, as transparent. Pixels of an alpha channel that is empty are void.
 
-use super::tiles::{self, TRANSPARENT};
-use super::{Input, georeference_beside, info};
-use crate::voids::VoidRule;
+use super::tiles::{self, Encoding, TRANSPARENT};
+use super::{Input, georeference_beside, info, pam::Notes};
 use crate::{Error, MemorySource, Source};
 use png::{BitDepth, ColorType, Decoder, Limits, Transformations};
 
@@ -29,29 +28,39 @@ pub fn open(mut input: Input) -> Result<Box<dyn Source>, Error> {
     let mut info = info("PNG", columns, rows);
     info.georeference = georeference_beside(&input, columns, rows, &["pgw", "pngw", "wld"]);
     info.warnings = pixels.warnings;
-    match pixels.values {
+    let notes = Notes::beside(&input);
+    info.warnings.extend(notes.warnings);
+    match as_asked(pixels.values, input.encoding).map_err(|problem| input.error(problem))? {
         Values::Grey { values, bits } => {
-            info.step = 1.0;
+            info.vertical_metres = notes.band.metres(&mut info.warnings).unwrap_or(1.0);
+            // Alpha was turned into NaN; no value of 0 … 65 535 is a sentinel.
+            let rule = notes.band.rule(info.vertical_metres);
+            info.nodata = rule.nodata;
+            info.step = (rule.scale * rule.metres).abs();
             info.warnings.push(match bits {
                 16 => "grey values of a PNG are taken as metres".into(),
                 bits => format!(
                     "grey values of a PNG are taken as metres: with {bits} bits a sample, land comes in steps of 1 m"
                 ),
             });
-            // Alpha was turned into NaN; no value of 0 … 65 535 is a sentinel.
-            let rule = VoidRule::default();
             let heights = values.into_iter().map(|v| rule.height(f64::from(v))).collect();
             Ok(Box::new(MemorySource::new(info, heights)))
         }
         Values::Colour(colours) => {
-            let code = tiles::detect(&colours, columns).map_err(|problem| input.error(problem))?;
+            let code = match input.encoding {
+                Some(Encoding::Code(code)) => code,
+                _ => tiles::detect(&colours, columns)
+                    .map_err(|problem| input.error(format!("{problem}; if they are heights, choose the encoding")))?,
+            };
             info.format = match code {
                 tiles::Code::Terrarium => "PNG (Terrarium)",
                 tiles::Code::TerrainRgb => "PNG (Terrain-RGB)",
             };
             info.step = code.step();
-            info.warnings
-                .push(format!("colours are read as heights in the {code:?} code, told by what they decode to"));
+            if input.encoding.is_none() {
+                info.warnings
+                    .push(format!("colours are read as heights in the {code:?} code, told by what they decode to"));
+            }
             let heights = colours.into_iter().map(|pixel| code.height(pixel)).collect();
             Ok(Box::new(MemorySource::new(info, heights)))
         }
@@ -70,6 +79,29 @@ enum Values {
     Grey { values: Vec<f32>, bits: u8 },
     /// `0xRRGGBB`, with [`TRANSPARENT`].
     Colour(Vec<u32>),
+}
+
+/// The same pixels in the encoding that was asked for; if none was, colours that are all grey are greys, saved by a program
+/// that knows nothing else.
+fn as_asked(values: Values, encoding: Option<Encoding>) -> Result<Values, String> {
+    match (values, encoding) {
+        (Values::Grey { .. }, Some(Encoding::Code(code))) => {
+            Err(format!("expected colours, to be read as {code:?}, got greys; leave out the encoding"))
+        }
+        (Values::Colour(colours), None | Some(Encoding::Grey)) => {
+            let opaque = || colours.iter().filter(|&p| p & TRANSPARENT == 0);
+            let all_grey = opaque().all(|p| p & 0xFF == p >> 8 & 0xFF && p & 0xFF == p >> 16 & 0xFF);
+            if all_grey && opaque().next().is_some() {
+                let grey = |p: u32| if p & TRANSPARENT != 0 { f32::NAN } else { (p & 0xFF) as f32 };
+                return Ok(Values::Grey { values: colours.into_iter().map(grey).collect(), bits: 8 });
+            }
+            match encoding {
+                None => Ok(Values::Colour(colours)),
+                Some(_) => Err("expected red, green and blue to be equal, as in greys, got colours".into()),
+            }
+        }
+        (values, _) => Ok(values),
+    }
 }
 
 fn decode(input: &mut Input) -> Result<Pixels, Error> {
@@ -148,18 +180,7 @@ fn decode(input: &mut Input) -> Result<Pixels, Error> {
         Values::Grey { values, .. } => values.resize(samples, f32::NAN),
         Values::Colour(colours) => colours.resize(samples, TRANSPARENT),
     }
-    Ok(Pixels { columns, rows, values: greys_of_colours(values), warnings })
-}
-
-/// Colours that are all grey are greys saved by a program that knows nothing else.
-fn greys_of_colours(values: Values) -> Values {
-    match values {
-        Values::Colour(colours) if colours.iter().all(|p| p & 0xFF == p >> 8 & 0xFF && p & 0xFF == p >> 16 & 0xFF) => {
-            let grey = |p: u32| if p & TRANSPARENT != 0 { f32::NAN } else { (p & 0xFF) as f32 };
-            Values::Grey { values: colours.into_iter().map(grey).collect(), bits: 8 }
-        }
-        values => values,
-    }
+    Ok(Pixels { columns, rows, values, warnings })
 }
 
 #[cfg(test)]
@@ -207,6 +228,51 @@ mod tests {
         let (info, got) = read(encode(64, 64, ColorType::Rgb, BitDepth::Eight, &data)).expect("reads");
         assert_eq!(info.format, "PNG (Terrarium)");
         assert!(heights.iter().zip(got).all(|(h, g)| (h - f64::from(g)).abs() < 1.0 / 128.0));
+    }
+
+    #[test]
+    fn an_encoding_that_is_chosen_is_not_doubted() {
+        let read = |bytes, encoding| {
+            let mut input = Input::memory("t.png", bytes);
+            input.encoding = Some(encoding);
+            let mut source = crate::formats::open_input(input)?;
+            let Info { columns, rows, .. } = *source.info();
+            Ok::<_, Error>((source.info().clone(), source.read(0, Window { column: 0, row: 0, columns, rows })?))
+        };
+        let (terrarium, mapbox) = (Encoding::Code(tiles::Code::Terrarium), Encoding::Code(tiles::Code::TerrainRgb));
+        // Colours that are all grey are greys, unless someone says otherwise. The last is transparent.
+        let grey = || encode(3, 1, ColorType::Rgba, BitDepth::Eight, &[7, 7, 7, 255, 140, 140, 140, 255, 1, 2, 3, 0]);
+        let (info, heights) = read(grey(), Encoding::Grey).expect("reads");
+        assert_eq!((info.format, &heights[..2], heights[2].is_nan()), ("PNG", &[7.0, 140.0][..], true));
+        let (_, heights) = read(grey(), terrarium).expect("reads");
+        assert_eq!((heights[0].is_nan(), heights[1]), (true, 3212.546_875));
+        let picture = encode(2, 1, ColorType::Rgb, BitDepth::Eight, &[250, 0, 0, 20, 7, 0]);
+        assert!(
+            open(Input::memory("t.png", picture)).err().expect("a picture").to_string().contains("choose the encoding")
+        );
+        // (1, 0, 0) is 6553.6 − 10 000 m in one code and far below the sea bed in the other.
+        let colour = || encode(2, 1, ColorType::Rgb, BitDepth::Eight, &[1, 0, 0, 128, 1, 0]);
+        let (info, heights) = read(colour(), mapbox).expect("reads");
+        assert_eq!((info.format, heights[0], heights[1].is_nan()), ("PNG (Terrain-RGB)", -3446.4, true));
+        let (info, heights) = read(colour(), terrarium).expect("reads");
+        assert_eq!((info.format, heights[0].is_nan(), heights[1]), ("PNG (Terrarium)", true, 1.0));
+        assert!(info.warnings.is_empty());
+        assert!(read(colour(), Encoding::Grey).expect_err("colours").to_string().contains("got colours"));
+        let greys = encode(2, 1, ColorType::Grayscale, BitDepth::Eight, &[1, 2]);
+        assert!(read(greys, mapbox).expect_err("greys").to_string().contains("got greys"));
+        assert!(read(b"ncols 2\n".to_vec(), mapbox).expect_err("text").to_string().contains("expected a PNG"));
+    }
+
+    #[test]
+    fn notes_beside_say_what_greys_are() {
+        let notes = "<PAMDataset><GeoTransform>9, 2, 0, 8, 0, -2</GeoTransform><PAMRasterBand band=\"1\"><NoDataValue>0\
+            </NoDataValue><Scale>0.1</Scale><Offset>-10</Offset></PAMRasterBand></PAMDataset>";
+        let bytes = encode(3, 1, ColorType::Grayscale, BitDepth::Eight, &[0, 100, 255]);
+        let mut source = open(Input::memory("t.png", bytes).with_sidecar("aux.xml", notes.into())).expect("opens");
+        let heights = source.read(0, Window { column: 0, row: 0, columns: 3, rows: 1 }).expect("reads");
+        assert_eq!((heights[0].is_nan(), heights[1], heights[2]), (true, 0.0, 15.5));
+        let info = source.info();
+        assert_eq!((info.georeference.geotransform[0], info.nodata, info.step), (9.0, Some(0.0), 0.1));
     }
 
     #[test]

@@ -18,6 +18,7 @@ pub enum SampleType {
     I32,
     U64,
     I64,
+    F16,
     F32,
     F64,
 }
@@ -27,7 +28,7 @@ impl SampleType {
     pub fn bytes(self) -> u64 {
         match self {
             SampleType::U8 | SampleType::I8 => 1,
-            SampleType::U16 | SampleType::I16 => 2,
+            SampleType::U16 | SampleType::I16 | SampleType::F16 => 2,
             SampleType::U32 | SampleType::I32 | SampleType::F32 => 4,
             SampleType::U64 | SampleType::I64 | SampleType::F64 => 8,
         }
@@ -35,7 +36,7 @@ impl SampleType {
 
     /// Distance between neighbouring numbers of this type: 1, or 0 for floating point.
     pub fn step(self) -> f64 {
-        if matches!(self, SampleType::F32 | SampleType::F64) { 0.0 } else { 1.0 }
+        if matches!(self, SampleType::F16 | SampleType::F32 | SampleType::F64) { 0.0 } else { 1.0 }
     }
 }
 
@@ -148,13 +149,17 @@ impl Source for RawSource {
 fn decode_row(bytes: &[u8], layout: Layout, rule: &VoidRule, columns: usize, heights: &mut Vec<f32>) {
     let stride = layout.sample_stride as usize;
     macro_rules! decode {
-        ($number:ty) => {{
+        ($number:ty) => {
+            decode!($number, |n| n as f64)
+        };
+        ($number:ty, $to:expr) => {{
             const SIZE: usize = size_of::<$number>();
             let samples = bytes.chunks(stride).filter_map(|chunk| chunk.first_chunk::<SIZE>()).take(columns);
+            let to: fn($number) -> f64 = $to;
             if layout.big_endian {
-                heights.extend(samples.map(|&s| rule.height(<$number>::from_be_bytes(s) as f64)));
+                heights.extend(samples.map(|&s| rule.height(to(<$number>::from_be_bytes(s)))));
             } else {
-                heights.extend(samples.map(|&s| rule.height(<$number>::from_le_bytes(s) as f64)));
+                heights.extend(samples.map(|&s| rule.height(to(<$number>::from_le_bytes(s)))));
             }
         }};
     }
@@ -167,6 +172,7 @@ fn decode_row(bytes: &[u8], layout: Layout, rule: &VoidRule, columns: usize, hei
         SampleType::I32 => decode!(i32),
         SampleType::U64 => decode!(u64),
         SampleType::I64 => decode!(i64),
+        SampleType::F16 => decode!(half::f16, half::f16::to_f64),
         SampleType::F32 => decode!(f32),
         SampleType::F64 => decode!(f64),
     }

@@ -20,6 +20,15 @@ pub enum Code {
     TerrainRgb,
 }
 
+/// What the pixels of a picture of heights mean, where whoever opens it knows better than [`detect`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// A code of 24 bits.
+    Code(Code),
+    /// Greys are metres, also where they are stored as colours.
+    Grey,
+}
+
 /// Set in a pixel that is transparent: there is no data.
 pub const TRANSPARENT: u32 = 1 << 24;
 

@@ -3,6 +3,7 @@
 //! OGC 19-008r4, *OGC GeoTIFF Standard* 1.1, 2019; GDAL's `GDAL_NODATA` and `GDAL_METADATA` tags.
 
 use super::{Sink, whole};
+use crate::formats::{Input, pam::Notes};
 use crate::{Crs, Error, Georeference, Registration};
 use std::io;
 use std::path::Path;
@@ -35,8 +36,12 @@ pub struct GeoTags {
 const RASTER_TYPE: u16 = 1025;
 
 impl GeoTags {
-    /// Those of a TIFF file; `None` for any other file, and for one without keys.
+    /// Those of a TIFF file; `None` for any other file, for one without keys, and for one whose keys are overruled by an
+    /// `.aux.xml` beside it.
     pub fn of_file(file: &Path) -> Option<GeoTags> {
+        if Notes::beside(&Input::file(file).ok()?).crs.is_some() {
+            return None;
+        }
         let mut decoder = tiff::decoder::Decoder::new(std::io::BufReader::new(std::fs::File::open(file).ok()?)).ok()?;
         // Keys of a thousand coordinate systems are shorter than this; anything longer is broken.
         const LONGEST: usize = 1 << 16;

@@ -5,6 +5,7 @@
 
 use super::image::{Compression, Image};
 use super::samples::SampleKind;
+use crate::formats::raw::SampleType;
 
 /// What decoding needs again and again; one for each thread.
 #[derive(Default)]
@@ -211,20 +212,21 @@ fn lerc(image: &Image, blob: &[u8], decoded: &mut [u8]) -> Result<usize, String>
         Ok(count * N)
     }
     let interleaved = image.interleaved;
-    match (image.kind, info.data_type) {
-        (SampleKind::I8, lerc::DataType::Char) => typed(blob, count, interleaved, decoded, i8::to_ne_bytes, 0, 0),
-        (SampleKind::U8, lerc::DataType::Byte) => typed(blob, count, interleaved, decoded, u8::to_ne_bytes, 0, 0),
-        (SampleKind::I16, lerc::DataType::Short) => typed(blob, count, interleaved, decoded, i16::to_ne_bytes, 0, 0),
-        (SampleKind::U16, lerc::DataType::UShort) => typed(blob, count, interleaved, decoded, u16::to_ne_bytes, 0, 0),
-        (SampleKind::I32, lerc::DataType::Int) => typed(blob, count, interleaved, decoded, i32::to_ne_bytes, 0, 0),
-        (SampleKind::U32, lerc::DataType::UInt) => typed(blob, count, interleaved, decoded, u32::to_ne_bytes, 0, 0),
-        (SampleKind::F32, lerc::DataType::Float) => {
+    let SampleKind::Number(number) = image.kind else { return Err("expected numbers under LERC, got bits".into()) };
+    match (number, info.data_type) {
+        (SampleType::I8, lerc::DataType::Char) => typed(blob, count, interleaved, decoded, i8::to_ne_bytes, 0, 0),
+        (SampleType::U8, lerc::DataType::Byte) => typed(blob, count, interleaved, decoded, u8::to_ne_bytes, 0, 0),
+        (SampleType::I16, lerc::DataType::Short) => typed(blob, count, interleaved, decoded, i16::to_ne_bytes, 0, 0),
+        (SampleType::U16, lerc::DataType::UShort) => typed(blob, count, interleaved, decoded, u16::to_ne_bytes, 0, 0),
+        (SampleType::I32, lerc::DataType::Int) => typed(blob, count, interleaved, decoded, i32::to_ne_bytes, 0, 0),
+        (SampleType::U32, lerc::DataType::UInt) => typed(blob, count, interleaved, decoded, u32::to_ne_bytes, 0, 0),
+        (SampleType::F32, lerc::DataType::Float) => {
             typed(blob, count, interleaved, decoded, f32::to_ne_bytes, 0.0, f32::NAN)
         }
-        (SampleKind::F64, lerc::DataType::Double) => {
+        (SampleType::F64, lerc::DataType::Double) => {
             typed(blob, count, interleaved, decoded, f64::to_ne_bytes, 0.0, f64::NAN)
         }
-        (kind, got) => Err(format!("expected LERC numbers of {kind:?}, got {got:?}")),
+        (number, got) => Err(format!("expected LERC numbers of {number:?}, got {got:?}")),
     }
 }
 

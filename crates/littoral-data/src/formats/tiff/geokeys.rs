@@ -1,6 +1,6 @@
-//! Where a GeoTIFF's samples lie and what they are counted in: GeoKeys, tie points, and GDAL's additions.
+//! Where a GeoTIFF's samples lie and what they are counted in: GeoKeys and tie points.
 //!
-//! Based on: OGC 19-008r4. GeoTIFF standard 1.1. 2019; GDAL's driver documentation for tags 42112 and 42113.
+//! Based on: OGC 19-008r4. GeoTIFF standard 1.1. 2019.
 
 use super::directory::{Container, Directory};
 use super::image::tag;
@@ -26,28 +26,23 @@ enum Value {
     Text(String),
 }
 
+/// A directory's keys by their numbers.
+struct Keys(HashMap<u16, Value>);
+
 /// The code that says "not one of the list: see the other keys".
 const USER_DEFINED: u16 = 32767;
 
 /// Reads the georeferencing tags of a directory.
 pub(super) fn placement(file: &Container, directory: &Directory) -> Placement {
-    let keys = keys(file, directory);
-    let code = |key: u16| match keys.get(&key) {
-        Some(&Value::Code(code)) if code != 0 => Some(code),
-        _ => None,
-    };
-    let text = |key: u16| match keys.get(&key) {
-        Some(Value::Text(text)) if !text.is_empty() => Some(text.clone()),
-        _ => None,
-    };
+    let keys = Keys::read(file, directory);
     let mut warnings = Vec::new();
-    let registration = if code(1025) == Some(2) { Registration::Point } else { Registration::Area };
+    let registration = if keys.code(1025) == Some(2) { Registration::Point } else { Registration::Area };
     let crs = crs(&keys, &mut warnings);
 
     let geotransform = geotransform(file, directory, registration, &mut warnings);
-    let vertical = code(4096).filter(|&code| code != USER_DEFINED);
+    let vertical = keys.code(4096).filter(|&code| code != USER_DEFINED);
     let datum_name = vertical.and_then(vertical_name).map(str::to_owned);
-    let vertical_datum = match (vertical, text(4097), code(4098)) {
+    let vertical_datum = match (vertical, keys.text(4097), keys.code(4098)) {
         (Some(code), _, _) if datum_name.is_some() => {
             VerticalDatum::Named(format!("EPSG:{code} ({})", datum_name.unwrap_or_default()))
         }
@@ -61,7 +56,7 @@ pub(super) fn placement(file: &Container, directory: &Directory) -> Placement {
         warnings
             .push("the vertical system counts depth downward; the numbers are taken as heights all the same".into());
     }
-    let vertical_metres = match code(4099) {
+    let vertical_metres = match keys.code(4099) {
         Some(unit) => {
             let metres = metres_of_unit(unit.into());
             if metres.is_none() {
@@ -78,29 +73,60 @@ pub(super) fn placement(file: &Container, directory: &Directory) -> Placement {
     Placement { geotransform, registration, crs, vertical_metres, vertical_datum, warnings }
 }
 
-/// All GeoKeys that can be made sense of.
-fn keys(file: &Container, directory: &Directory) -> HashMap<u16, Value> {
-    let table = file.unsigneds(directory, tag::GEO_KEYS).ok().flatten().unwrap_or_default();
-    let doubles = file.doubles(directory, tag::GEO_DOUBLES);
-    let text = file.text_bytes(directory, tag::GEO_TEXT);
-    let mut keys = HashMap::new();
-    let count = table.get(3).copied().unwrap_or(0) as usize;
-    for entry in table.get(4..).unwrap_or_default().chunks_exact(4).take(count) {
-        let &[key, place, count, at] = entry else { continue };
-        let at = at as usize;
-        let value = match place {
-            0 => Some(Value::Code(at as u16)),
-            34736 => doubles.get(at).copied().map(Value::Number),
-            34737 => text
-                .get(at..(at + count as usize).min(text.len()))
-                .map(|bytes| Value::Text(String::from_utf8_lossy(bytes).trim_end_matches(['|', '\0', ' ']).to_owned())),
+impl Keys {
+    /// All keys of a directory that can be made sense of.
+    fn read(file: &Container, directory: &Directory) -> Keys {
+        let table = file.unsigneds(directory, tag::GEO_KEYS).ok().flatten().unwrap_or_default();
+        let doubles = file.doubles(directory, tag::GEO_DOUBLES);
+        let text = file.text_bytes(directory, tag::GEO_TEXT);
+        let mut keys = HashMap::new();
+        let count = table.get(3).copied().unwrap_or(0) as usize;
+        for entry in table.get(4..).unwrap_or_default().chunks_exact(4).take(count) {
+            let &[key, place, count, at] = entry else { continue };
+            let at = at as usize;
+            let value = match place {
+                0 => Some(Value::Code(at as u16)),
+                34736 => doubles.get(at).copied().map(Value::Number),
+                34737 => text.get(at..(at + count as usize).min(text.len())).map(|bytes| {
+                    Value::Text(String::from_utf8_lossy(bytes).trim_end_matches(['|', '\0', ' ']).to_owned())
+                }),
+                _ => None,
+            };
+            if let Some(value) = value {
+                keys.insert(key as u16, value);
+            }
+        }
+        Keys(keys)
+    }
+
+    /// A code other than 0, which stands for "undefined".
+    fn code(&self, key: u16) -> Option<u16> {
+        match self.0.get(&key) {
+            Some(&Value::Code(code)) if code != 0 => Some(code),
             _ => None,
-        };
-        if let Some(value) = value {
-            keys.insert(key as u16, value);
         }
     }
-    keys
+
+    /// A text that is not empty.
+    fn text(&self, key: u16) -> Option<String> {
+        match self.0.get(&key) {
+            Some(Value::Text(text)) if !text.is_empty() => Some(text.clone()),
+            _ => None,
+        }
+    }
+
+    /// A finite number.
+    fn number(&self, key: u16) -> Option<f64> {
+        match self.0.get(&key) {
+            Some(&Value::Number(number)) if number.is_finite() => Some(number),
+            _ => None,
+        }
+    }
+
+    /// Metres in a unit of the projected coordinates.
+    fn unit(&self) -> Option<f64> {
+        self.code(3076).and_then(|code| metres_of_unit(code.into())).or(self.number(3077))
+    }
 }
 
 /// Tags 33550, 33922 and 34264 as GDAL's six numbers, corners of pixels in any case.
@@ -141,21 +167,9 @@ fn geotransform(
 }
 
 /// The horizontal system.
-fn crs(keys: &HashMap<u16, Value>, warnings: &mut Vec<String>) -> Crs {
-    let code = |key: u16| match keys.get(&key) {
-        Some(&Value::Code(code)) if code != 0 => Some(code),
-        _ => None,
-    };
-    let text = |key: u16| match keys.get(&key) {
-        Some(Value::Text(text)) if !text.is_empty() => Some(text.clone()),
-        _ => None,
-    };
-    let number = |key: u16| match keys.get(&key) {
-        Some(&Value::Number(number)) => Some(number),
-        _ => None,
-    };
-    let unit = code(3076).and_then(|code| metres_of_unit(code.into())).or(number(3077));
-    let projected = code(3072);
+fn crs(keys: &Keys, warnings: &mut Vec<String>) -> Crs {
+    let unit = keys.unit();
+    let projected = keys.code(3072);
     if let Some(code) = projected.filter(|&code| code != USER_DEFINED) {
         return match Crs::from_epsg(code.into()) {
             Some(Crs::Projected { name, metres, definition }) => {
@@ -165,23 +179,23 @@ fn crs(keys: &HashMap<u16, Value>, warnings: &mut Vec<String>) -> Crs {
             None => Crs::Projected { name: format!("EPSG:{code}"), metres: unit.unwrap_or(1.0), definition: None },
         };
     }
-    let model = code(1024);
+    let model = keys.code(1024);
     if projected.is_some() || model == Some(1) {
         let definition = definition(keys);
-        let name = text(3073).or(text(1026)).unwrap_or_else(|| "user-defined projection".into());
+        let name = keys.text(3073).or(keys.text(1026)).unwrap_or_else(|| "user-defined projection".into());
         if let Some(wkt) = name.strip_prefix("ESRI PE String = ") {
             return Crs::from_wkt(wkt);
         }
         return Crs::Projected { name, metres: unit.unwrap_or(1.0), definition };
     }
-    if let Some(code) = code(2048) {
+    if let Some(code) = keys.code(2048) {
         if code == USER_DEFINED {
-            return Crs::Geographic { name: text(2049).unwrap_or_else(|| "user-defined ellipsoid".into()) };
+            return Crs::Geographic { name: keys.text(2049).unwrap_or_else(|| "user-defined ellipsoid".into()) };
         }
         return Crs::from_epsg(code.into()).unwrap_or(Crs::Geographic { name: format!("EPSG:{code}") });
     }
     match model {
-        Some(2) => Crs::Geographic { name: text(2049).unwrap_or_else(|| "geographic, not named".into()) },
+        Some(2) => Crs::Geographic { name: keys.text(2049).unwrap_or_else(|| "geographic, not named".into()) },
         Some(3) => {
             warnings
                 .push("the coordinates are geocentric, which a grid of heights cannot be; they are left out".into());
@@ -192,19 +206,11 @@ fn crs(keys: &HashMap<u16, Value>, warnings: &mut Vec<String>) -> Crs {
 }
 
 /// PROJ's words for a projection given by its parameters; `None` for methods that are not among the common ones.
-fn definition(keys: &HashMap<u16, Value>) -> Option<String> {
-    let code = |key: u16| match keys.get(&key) {
-        Some(&Value::Code(code)) => Some(code),
-        _ => None,
-    };
-    let number = |key: u16| match keys.get(&key) {
-        Some(&Value::Number(number)) if number.is_finite() => Some(number),
-        _ => None,
-    };
+fn definition(keys: &Keys) -> Option<String> {
     // EPSG's conversions 16001 … 16160 are UTM's zones; they stand alone.
-    let base = match code(2048) {
+    let base = match keys.code(2048) {
         Some(code) if code != USER_DEFINED => crate::crs::ellipsoid_words(code.into())?,
-        _ => match (code(2056), number(2057), number(2059)) {
+        _ => match (keys.code(2056), keys.number(2057), keys.number(2059)) {
             (_, Some(a), Some(inverse)) => format!("+a={a} +rf={inverse}"),
             (Some(7004), ..) => "+ellps=bessel".into(),
             (Some(7008), ..) => "+ellps=clrk66".into(),
@@ -213,17 +219,18 @@ fn definition(keys: &HashMap<u16, Value>) -> Option<String> {
             _ => "+datum=WGS84".into(),
         },
     };
-    if let Some(zone) = code(3074).filter(|zone| (16001..=16060).contains(zone) || (16101..=16160).contains(zone)) {
+    if let Some(zone) = keys.code(3074).filter(|zone| (16001..=16060).contains(zone) || (16101..=16160).contains(zone))
+    {
         let south = if zone > 16100 { " +south" } else { "" };
         return Some(format!("+proj=utm +zone={}{south} {base} +units=m +no_defs", (zone - 16000) % 100));
     }
-    let any = |options: &[u16]| options.iter().find_map(|&key| number(key)).unwrap_or(0.0);
-    let unit = code(3076).and_then(|code| metres_of_unit(code.into())).or(number(3077)).unwrap_or(1.0);
+    let any = |options: &[u16]| options.iter().find_map(|&key| keys.number(key)).unwrap_or(0.0);
+    let unit = keys.unit().unwrap_or(1.0);
     let (east, north) = (any(&[3082, 3086, 3090]) * unit, any(&[3083, 3087, 3091]) * unit);
     let (longitude, latitude) = (any(&[3080, 3084, 3088, 3095]), any(&[3081, 3085, 3089]));
-    let scale = number(3092).or(number(3093)).unwrap_or(1.0);
+    let scale = keys.number(3092).or(keys.number(3093)).unwrap_or(1.0);
     let (first, second) = (any(&[3078]), any(&[3079]));
-    let method = match code(3075)? {
+    let method = match keys.code(3075)? {
         1 => format!("+proj=tmerc +lat_0={latitude} +lon_0={longitude} +k={scale}"),
         7 => format!("+proj=merc +lon_0={longitude} +k={scale}"),
         8 => format!("+proj=lcc +lat_1={first} +lat_2={second} +lat_0={latitude} +lon_0={longitude}"),
@@ -276,54 +283,4 @@ fn vertical_name(code: u16) -> Option<&'static str> {
         6358 => "NAVD88 depth (ftUS)",
         _ => return None,
     })
-}
-
-/// What GDAL's XML (tag 42112) says about the first band's heights.
-#[derive(Default)]
-pub(super) struct BandNotes {
-    pub scale: Option<f64>,
-    pub offset: Option<f64>,
-    pub unit: Option<String>,
-}
-
-/// Reads GDAL's XML: `<Item name="SCALE" sample="0" role="scale">0.1</Item>`. Anything else in it is passed over.
-pub(super) fn band_notes(xml: &str) -> BandNotes {
-    let mut notes = BandNotes::default();
-    for item in xml.split("<Item").skip(1) {
-        let Some((head, rest)) = item.split_once('>') else { continue };
-        let Some((value, _)) = rest.split_once("</Item") else { continue };
-        let attribute = |name: &str| {
-            let (_, after) = head.split_once(&format!(" {name}=\""))?;
-            Some(after.split_once('"')?.0)
-        };
-        if attribute("sample") != Some("0") {
-            continue;
-        }
-        let number = || value.trim().parse::<f64>().ok().filter(|number| number.is_finite());
-        match attribute("role") {
-            Some("scale") => notes.scale = number().filter(|&scale| scale != 0.0),
-            Some("offset") => notes.offset = number(),
-            Some("unittype") => notes.unit = Some(value.trim().to_owned()),
-            _ => {}
-        }
-    }
-    notes
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn gdals_notes_are_those_of_the_first_band() {
-        let notes = band_notes(
-            "<GDALMetadata>\n<Item name=\"SCALE\" sample=\"1\" role=\"scale\">7</Item>\
-             <Item name=\"OFFSET\" sample=\"0\" role=\"offset\">-5</Item><Item name=\"x\">1</Item>\
-             <Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.304800000000000015</Item>\
-             <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item></GDALMetadata>",
-        );
-        assert_eq!((notes.scale, notes.offset, notes.unit.as_deref()), (Some(0.3048), Some(-5.0), Some("ft")));
-        let broken = band_notes("<Item sample=\"0\" role=\"scale\">nan</Item><Item sample=\"0\" role=\"offset\">");
-        assert_eq!((broken.scale, broken.offset), (None, None));
-    }
 }

@@ -5,6 +5,7 @@
 
 use super::directory::{Container, Directory};
 use super::samples::{Predictor, SampleKind};
+use crate::formats::raw::SampleType;
 
 /// No chunk may be larger when decoded (bytes): writers use kilobytes to a few megabytes, and a single strip for a whole
 /// uncompressed image, which is not read as one.
@@ -310,18 +311,18 @@ fn kind(file: &Container, directory: &Directory) -> Result<SampleKind, String> {
     if let Some(other) = bits.iter().find(|&&other| other != first) {
         return Err(format!("expected bands of one bit depth, got {first} and {other}"));
     }
-    match (format, first) {
-        (1 | 4, 8) => Ok(SampleKind::U8),
-        (1 | 4, 16) => Ok(SampleKind::U16),
-        (1 | 4, 32) => Ok(SampleKind::U32),
-        (1 | 4, 64) => Ok(SampleKind::U64),
-        (2, 8) => Ok(SampleKind::I8),
-        (2, 16) => Ok(SampleKind::I16),
-        (2, 32) => Ok(SampleKind::I32),
-        (2, 64) => Ok(SampleKind::I64),
-        (3, 16) => Ok(SampleKind::F16),
-        (3, 32) => Ok(SampleKind::F32),
-        (3, 64) => Ok(SampleKind::F64),
+    let number = match (format, first) {
+        (1 | 4, 8) => Ok(SampleType::U8),
+        (1 | 4, 16) => Ok(SampleType::U16),
+        (1 | 4, 32) => Ok(SampleType::U32),
+        (1 | 4, 64) => Ok(SampleType::U64),
+        (2, 8) => Ok(SampleType::I8),
+        (2, 16) => Ok(SampleType::I16),
+        (2, 32) => Ok(SampleType::I32),
+        (2, 64) => Ok(SampleType::I64),
+        (3, 16) => Ok(SampleType::F16),
+        (3, 32) => Ok(SampleType::F32),
+        (3, 64) => Ok(SampleType::F64),
         (5 | 6, _) => Err("expected real samples, got complex numbers, which are not heights".into()),
         (1..=4, bits) => Err(format!(
             "expected samples of 8, 16, 32 or 64 bits, got {bits}; `gdal_translate -of GTiff -co COMPRESS=DEFLATE -ot \
@@ -330,7 +331,8 @@ fn kind(file: &Container, directory: &Directory) -> Result<SampleKind, String> {
         (format, _) => {
             Err(format!("expected sample format 1, 2 or 3 (unsigned, signed, floating point), got {format}"))
         }
-    }
+    };
+    number.map(SampleKind::Number)
 }
 
 fn compression(file: &Container, directory: &Directory, kind: SampleKind) -> Result<Compression, String> {
@@ -352,7 +354,7 @@ fn compression(file: &Container, directory: &Directory, kind: SampleKind) -> Res
             };
         }
         2..=4 => "CCITT fax",
-        6 | 7 if kind != SampleKind::U8 => {
+        6 | 7 if kind != SampleKind::Number(SampleType::U8) => {
             return Err(format!(
                 "expected a lossless codec for {kind:?} samples, got JPEG (code {code}), which holds 8-bit pictures only; \
                  the header is damaged"

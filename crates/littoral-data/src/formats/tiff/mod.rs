@@ -29,7 +29,8 @@ pub fn sniff(start: &[u8]) -> bool {
     matches!(start.get(..4), Some([b'I', b'I', 42 | 43, 0] | [b'M', b'M', 0, 42 | 43]))
 }
 
-/// Opens a GeoTIFF, together with its overviews (`.ovr`) and world file (`.tfw`) beside it.
+/// Opens a GeoTIFF, together with its overviews (`.ovr`), masks (`.msk`), GDAL's notes (`.aux.xml`) and world
+/// file (`.tfw`) beside it.
 ///
 /// # Errors
 /// If the file cannot be read, is no TIFF, or holds no height samples that can be decoded.

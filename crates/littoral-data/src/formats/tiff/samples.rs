@@ -3,41 +3,30 @@
 //! Based on: Adobe. TIFF revision 6.0, section 14 (horizontal differencing). 1992; Adobe Photoshop TIFF Technical Note 3
 //! (the floating-point predictor: each row's bytes sorted by significance, highest first, then differenced). 2005.
 
+use crate::formats::raw::SampleType;
 use crate::voids::VoidRule;
 
-/// The number type of samples.
+/// What samples are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
 pub(super) enum SampleKind {
     /// One bit, eight to a byte, the highest first: masks alone.
     Bit,
-    U8,
-    I8,
-    U16,
-    I16,
-    U32,
-    I32,
-    U64,
-    I64,
-    F16,
-    F32,
-    F64,
+    /// Numbers of a machine type.
+    Number(SampleType),
 }
 
 impl SampleKind {
     /// Bytes of one sample; of eight for bits.
     pub(super) fn size(self) -> usize {
         match self {
-            SampleKind::Bit | SampleKind::U8 | SampleKind::I8 => 1,
-            SampleKind::U16 | SampleKind::I16 | SampleKind::F16 => 2,
-            SampleKind::U32 | SampleKind::I32 | SampleKind::F32 => 4,
-            SampleKind::U64 | SampleKind::I64 | SampleKind::F64 => 8,
+            SampleKind::Bit => 1,
+            SampleKind::Number(number) => number.bytes() as usize,
         }
     }
 
     /// Whether samples are floating-point numbers.
     pub(super) fn is_float(self) -> bool {
-        matches!(self, SampleKind::F16 | SampleKind::F32 | SampleKind::F64)
+        matches!(self, SampleKind::Number(number) if number.step() == 0.0)
     }
 }
 
@@ -174,23 +163,27 @@ pub(super) fn heights_of_row(row: &[u8], kind: SampleKind, stride: usize, rule: 
             }
         }
     }
-    match kind {
+    let number = match kind {
         SampleKind::Bit => {
             for (at, height) in heights.iter_mut().enumerate() {
                 *height = row.get(at / 8).map_or(f32::NAN, |byte| f32::from(byte >> (7 - at % 8) & 1));
             }
+            return;
         }
-        SampleKind::U8 => each(row, stride, rule, heights, |b: [u8; 1]| b[0].into()),
-        SampleKind::I8 => each(row, stride, rule, heights, |b| i8::from_ne_bytes(b).into()),
-        SampleKind::U16 => each(row, stride, rule, heights, |b| u16::from_ne_bytes(b).into()),
-        SampleKind::I16 => each(row, stride, rule, heights, |b| i16::from_ne_bytes(b).into()),
-        SampleKind::U32 => each(row, stride, rule, heights, |b| u32::from_ne_bytes(b).into()),
-        SampleKind::I32 => each(row, stride, rule, heights, |b| i32::from_ne_bytes(b).into()),
-        SampleKind::U64 => each(row, stride, rule, heights, |b| u64::from_ne_bytes(b) as f64),
-        SampleKind::I64 => each(row, stride, rule, heights, |b| i64::from_ne_bytes(b) as f64),
-        SampleKind::F16 => each(row, stride, rule, heights, |b| half::f16::from_ne_bytes(b).to_f64()),
-        SampleKind::F32 => each(row, stride, rule, heights, |b| f32::from_ne_bytes(b).into()),
-        SampleKind::F64 => each(row, stride, rule, heights, f64::from_ne_bytes),
+        SampleKind::Number(number) => number,
+    };
+    match number {
+        SampleType::U8 => each(row, stride, rule, heights, |b: [u8; 1]| b[0].into()),
+        SampleType::I8 => each(row, stride, rule, heights, |b| i8::from_ne_bytes(b).into()),
+        SampleType::U16 => each(row, stride, rule, heights, |b| u16::from_ne_bytes(b).into()),
+        SampleType::I16 => each(row, stride, rule, heights, |b| i16::from_ne_bytes(b).into()),
+        SampleType::U32 => each(row, stride, rule, heights, |b| u32::from_ne_bytes(b).into()),
+        SampleType::I32 => each(row, stride, rule, heights, |b| i32::from_ne_bytes(b).into()),
+        SampleType::U64 => each(row, stride, rule, heights, |b| u64::from_ne_bytes(b) as f64),
+        SampleType::I64 => each(row, stride, rule, heights, |b| i64::from_ne_bytes(b) as f64),
+        SampleType::F16 => each(row, stride, rule, heights, |b| half::f16::from_ne_bytes(b).to_f64()),
+        SampleType::F32 => each(row, stride, rule, heights, |b| f32::from_ne_bytes(b).into()),
+        SampleType::F64 => each(row, stride, rule, heights, f64::from_ne_bytes),
     }
 }
 

@@ -2,29 +2,31 @@
 
 use super::codec::Scratch;
 use super::directory::Container;
-use super::geokeys::{band_notes, placement};
+use super::geokeys::placement;
 use super::heights::{Chunk, decode};
 use super::image::{Compression, Image, tag};
-use super::samples::SampleKind;
-use crate::bytes::Bytes;
-use crate::crs::{US_SURVEY_FOOT, metres_of_unit_name};
+use crate::crs::US_SURVEY_FOOT;
 use crate::formats::Input;
+use crate::formats::pam::{BandNotes, Notes};
 use crate::voids::VoidRule;
-use crate::{Crs, Error, Georeference, Info, Level, Source};
+use crate::{Crs, Error, Georeference, Info, Level, Source, VerticalDatum};
 use littoral::field::Window;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet, VecDeque};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Decoded heights kept for the next window (bytes), at least one chunk in any case.
 const CACHE: usize = 32 << 20;
 /// Decoded chunks of one parallel batch together (bytes), at least one chunk in any case.
 const BATCH: usize = 16 << 20;
 
+/// Companions that are TIFFs themselves, and whether they hold masks: coarser versions, the mask, and coarser masks.
+const COMPANIONS: [(&str, bool); 3] = [("ovr", false), ("msk", true), ("msk.ovr", true)];
+
 /// An opened GeoTIFF.
 pub(super) struct TiffSource {
     path: PathBuf,
-    /// The file, and the one with overviews beside it.
+    /// The file, and those with overviews and masks beside it.
     containers: Vec<Container>,
     /// For each level the container it lies in, and its layout; behind the levels their masks.
     images: Vec<(usize, Image)>,
@@ -56,7 +58,8 @@ impl TiffSource {
         };
         let world = sidecar(&["tfw", "tifw", "tiffw", "wld"]);
         let projection = sidecar(&["prj"]);
-        let outside = input.sidecar_path("ovr");
+        let beside = Notes::beside(&input);
+        let companions = COMPANIONS.map(|(extension, _)| (extension, input.sidecar_bytes(extension)));
         let file = Container::new(input.into_bytes()).map_err(error)?;
         let (directories, chain_warning) = file.directories().map_err(error)?;
         let mut warnings: Vec<String> = chain_warning.into_iter().collect();
@@ -70,22 +73,20 @@ impl TiffSource {
 
         let placement = placement(&file, directory);
         warnings.extend(placement.warnings);
-        let notes = file.text(directory, tag::GDAL_METADATA).map(|xml| band_notes(&xml)).unwrap_or_default();
+        let notes =
+            file.text(directory, tag::GDAL_METADATA).map_or(Ok(BandNotes::default()), |xml| BandNotes::of_tag(&xml));
+        let notes = notes.unwrap_or_else(|error| {
+            warnings.push(format!("GDAL's notes in tag {} are left aside: {error}", tag::GDAL_METADATA));
+            BandNotes::default()
+        });
         let nodata = file.text(directory, tag::GDAL_NODATA).and_then(|text| number(&text));
-        let unit = notes.unit.as_deref().and_then(metres_of_unit_name);
-        if let (Some(name), None) = (notes.unit.as_deref().filter(|name| !name.is_empty()), unit) {
-            warnings.push(format!("the unit of the heights, \"{name}\", is no length; metres are taken"));
-        }
-        let stated = unit.or(placement.vertical_metres);
-        let rule = VoidRule {
-            nodata,
-            scale: notes.scale.unwrap_or(1.0),
-            offset: notes.offset.unwrap_or(0.0),
-            metres: stated.unwrap_or(1.0),
-            ..VoidRule::default()
-        };
+        let notes = BandNotes { nodata, ..notes }.or(beside.band);
+        warnings.extend(beside.warnings);
+        let stated = notes.metres(&mut warnings).or(placement.vertical_metres);
+        let rule = notes.rule(stated.unwrap_or(1.0));
+        let crs = beside.crs.unwrap_or(placement.crs);
         if stated.is_none()
-            && let Crs::Projected { metres, .. } = placement.crs
+            && let Crs::Projected { metres, .. } = crs
             && (metres - 1.0).abs() > 1e-9
             && (metres - US_SURVEY_FOOT).abs() < 0.01
         {
@@ -93,15 +94,21 @@ impl TiffSource {
         }
 
         let mut georeference = Georeference::none(image.columns, image.rows);
-        georeference.registration = placement.registration;
-        georeference.crs = placement.crs;
+        georeference.registration = beside.registration.unwrap_or(placement.registration);
+        georeference.crs = crs;
         if georeference.crs == Crs::Unknown
             && let Some(text) = projection
         {
             georeference.crs = Crs::from_wkt(&text);
         }
-        if let Some(geotransform) = placement.geotransform.or_else(|| Georeference::geotransform_of_world_file(&world?))
-        {
+        if beside.geotransform.is_some() && placement.geotransform.is_some_and(|own| beside.geotransform != Some(own)) {
+            warnings.push(
+                "the .aux.xml beside the file places it elsewhere than its own tags; it is believed, as GDAL does"
+                    .into(),
+            );
+        }
+        let stated = beside.geotransform.or(placement.geotransform);
+        if let Some(geotransform) = stated.or_else(|| Georeference::geotransform_of_world_file(&world?)) {
             georeference.y_south = false;
             georeference.geotransform = geotransform;
         }
@@ -110,7 +117,7 @@ impl TiffSource {
             warnings.push(format!("{} bands: the first is taken as the height{alpha}", image.bands));
         }
         let step = if image.kind.is_float() { 0.0 } else { (rule.scale * rule.metres).abs() };
-        if matches!(image.kind, SampleKind::U8 | SampleKind::I8) {
+        if image.kind.size() == 1 {
             warnings.push(format!("8-bit samples: heights come in steps of {step} m"));
         }
         let whole = roles.iter().filter(|&&role| role == 0).count();
@@ -118,36 +125,52 @@ impl TiffSource {
             warnings.push(format!("{whole} images in one file: the first is read"));
         }
 
-        let mut images = vec![(0, image)];
-        for (directory, _) in directories.iter().zip(&roles).filter(|(_, role)| **role == 1) {
-            match Image::new(&file, directory) {
-                Ok(image) => images.push((0, image)),
-                Err(problem) => warnings.push(format!("an overview is left out: {problem}")),
+        let mut containers = vec![file];
+        let (mut images, mut loose_masks) = (vec![(0, image)], Vec::new());
+        let others = directories.iter().zip(roles).enumerate().filter(|(index, _)| *index != main);
+        for (_, (directory, role)) in others {
+            match role {
+                0 => {}
+                1 => push(&mut images, 0, Image::new(&containers[0], directory), "an overview", &mut warnings),
+                _ => push(&mut loose_masks, 0, Image::mask(&containers[0], directory), "a mask", &mut warnings),
             }
         }
-        let mut containers = vec![file];
-        if let Some(outside) = outside.and_then(|file| overviews_beside(&file, &mut warnings)) {
-            let (found, _) = outside.directories().unwrap_or_default();
-            images.extend(found.iter().filter_map(|directory| Some((1, Image::new(&outside, directory).ok()?))));
-            containers.push(outside);
+        for ((extension, content), (_, masks)) in companions.into_iter().zip(COMPANIONS) {
+            let content = content.map_err(|error| error.to_string()).transpose();
+            let container = match content.map(|content| content.and_then(Container::new)) {
+                None => continue,
+                Some(container) => container.and_then(|it| Ok((it.directories()?.0, it))),
+            };
+            match container {
+                Ok((found, container)) => {
+                    for directory in &found {
+                        let at = containers.len();
+                        let role = container.unsigned(directory, tag::NEW_SUBFILE_TYPE).ok().flatten().unwrap_or(0);
+                        if masks || role & 4 != 0 {
+                            push(&mut loose_masks, at, Image::mask(&container, directory), "a mask", &mut warnings);
+                        } else {
+                            push(&mut images, at, Image::new(&container, directory), "an overview", &mut warnings);
+                        }
+                    }
+                    containers.push(container);
+                }
+                Err(problem) => warnings.push(format!("the .{extension} beside the file is left out: {problem}")),
+            }
         }
         keep_overviews(&mut images);
-        // A mask belongs to the level of its size.
-        let mut masks = vec![None; images.len()];
-        for (directory, _) in directories.iter().zip(&roles).filter(|(_, role)| **role & 4 != 0) {
-            match Image::mask(&containers[0], directory) {
-                Ok(mask) => {
-                    let level = (0..masks.len()).find(|&level| {
-                        let image = &images[level].1;
-                        image.columns == mask.columns && image.rows == mask.rows && masks[level].is_none()
-                    });
-                    if let Some(level) = level {
-                        masks[level] = Some(images.len());
-                        images.push((0, mask));
-                    }
-                }
-                Err(problem) => warnings.push(format!("a mask is left out: {problem}")),
-            }
+        // A mask belongs to the level of its size. Without its mask a level shows what is masked: where the full one has a
+        // mask, levels without are dropped.
+        let mut masks = Vec::new();
+        let masked = |image: &Image, masks: &[(usize, Image)]| {
+            masks.iter().position(|(_, mask)| mask.columns == image.columns && mask.rows == image.rows)
+        };
+        let main_is_masked = masked(&images[0].1, &loose_masks).is_some();
+        images.retain(|(_, image)| !main_is_masked || masked(image, &loose_masks).is_some());
+        for level in 0..images.len() {
+            masks.push(masked(&images[level].1, &loose_masks).map(|mask| {
+                images.push(loose_masks.swap_remove(mask));
+                images.len() - 1
+            }));
         }
         let levels: Vec<Level> =
             images[..masks.len()].iter().map(|(_, image)| Level { columns: image.columns, rows: image.rows }).collect();
@@ -155,10 +178,13 @@ impl TiffSource {
             format: "GTiff",
             columns: levels[0].columns,
             rows: levels[0].rows,
-            nodata,
+            nodata: rule.nodata,
             georeference,
             vertical_metres: rule.metres,
-            vertical_datum: placement.vertical_datum,
+            vertical_datum: match (placement.vertical_datum, beside.vertical) {
+                (VerticalDatum::Unknown, Some(datum)) => datum,
+                (own, _) => own,
+            },
             step,
             warnings,
         };
@@ -361,13 +387,16 @@ fn keep_overviews(images: &mut Vec<(usize, Image)>) {
     });
 }
 
-/// A TIFF of overviews beside a file.
-fn overviews_beside(file: &Path, warnings: &mut Vec<String>) -> Option<Container> {
-    match Bytes::open(file).map_err(|error| error.to_string()).and_then(Container::new) {
-        Ok(container) => Some(container),
-        Err(problem) => {
-            warnings.push(format!("the overviews in {} are left out: {problem}", file.display()));
-            None
-        }
+/// Keeps an image of a container, or says why not.
+fn push(
+    images: &mut Vec<(usize, Image)>,
+    container: usize,
+    image: Result<Image, String>,
+    what: &str,
+    warnings: &mut Vec<String>,
+) {
+    match image {
+        Ok(image) => images.push((container, image)),
+        Err(problem) => warnings.push(format!("{what} is left out: {problem}")),
     }
 }
