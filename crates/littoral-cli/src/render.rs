@@ -366,11 +366,12 @@ impl Render {
         };
         let own_field = 2.0 * (0.5 * f64::from(self.size.y) / f64::from(chosen.view.pixels_per_radian)).atan();
         let field = self.fov.map_or(if self.eye.is_some() { 45f64.to_radians() } else { own_field }, f64::to_radians);
-        let Shot { mut view, mut sun, mut air, mut style } = chosen;
+        let Shot { mut view, mut sun, mut air, mut style, mut border } = chosen;
         let look = match self.eye {
             Some(eye) => {
                 let (eye, look) = (self.eye_position(subject, eye, talk)?, self.target(subject)?);
                 view = View::looking_at(eye, look, field as f32, self.size);
+                border = picture::suiting_border(land, water, eye);
                 look
             }
             None => {
@@ -399,7 +400,7 @@ impl Render {
                 StyleName::Image => picture::Style::Image,
             };
         }
-        Ok((Framed { shot: Shot { view, sun, air, style }, field }, look))
+        Ok((Framed { shot: Shot { view, sun, air, style, border }, field }, look))
     }
 
     fn eye_position(&self, subject: &Subject, eye: DVec3, talk: &mut Talk) -> Result<DVec3, Failure> {

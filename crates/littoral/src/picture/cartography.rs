@@ -67,9 +67,15 @@ impl Tints {
         Tints { low: range.low, high: range.high, level, slope }
     }
 
+    /// By how much slopes are steepened for the light on them, at least 1: on wide or flat land true slopes would show nothing.
+    /// Only the shades follow, as on any relief map; heights, and all that is measured, stay as they are.
+    pub fn steepening(&self) -> f32 {
+        (0.32 / self.slope).max(1.0)
+    }
+
     /// Albedo (linear) of ground at a height (m); `wet` says whether water lies over it where it is below the level.
     pub fn colour(&self, height: f32, wet: bool) -> Vec3 {
-        if wet && height < self.level {
+        if wet && height <= self.level {
             // The shelf is a small part of the depth and most of what one looks at.
             let t = ((self.level - height) / (self.level - self.low).max(1e-3)).clamp(0.0, 1.0);
             return run_through(BED, t.powf(0.6));

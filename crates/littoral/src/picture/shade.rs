@@ -2,6 +2,7 @@
 
 use super::Style;
 use super::atmosphere::Veil;
+use super::block::Wall;
 use super::cartography::relief;
 use super::grain::step;
 use super::ground::Surface;
@@ -30,6 +31,13 @@ pub enum Ahead {
     },
     /// The ground.
     Ground {
+        /// Where (m).
+        position: DVec3,
+    },
+    /// The side of a block.
+    Wall(Wall),
+    /// What a block stands on.
+    Floor {
         /// Where (m).
         position: DVec3,
     },
@@ -109,12 +117,18 @@ impl Stage<'_> {
                 let light = lens.sky.radiance(direction) + lens.sky.sun_disc(direction);
                 return Shaded { light, through: Vec3::ONE, sky: true, ..Shaded::default() };
             }
-            Ahead::Mist { position } | Ahead::Water { position } | Ahead::Ground { position } => position,
+            Ahead::Mist { position }
+            | Ahead::Water { position }
+            | Ahead::Ground { position }
+            | Ahead::Floor { position }
+            | Ahead::Wall(Wall { position, .. }) => position,
         };
         let distance = (position - lens.eye).length() as f32;
         let mut shaded = match ahead {
             Ahead::Water { .. } => self.water(lens, direction, position, distance, sampler, index, near),
             Ahead::Ground { .. } => self.ground(lens, direction, position, distance, sampler, index, near),
+            Ahead::Wall(wall) => self.cut(lens, direction, wall, self.to_sun(sampler, index)),
+            Ahead::Floor { .. } => self.floor(lens, position, self.to_sun(sampler, index)),
             _ => Shaded { light: self.mist, ..Shaded::default() },
         };
         shaded.through = Vec3::ONE;
@@ -148,6 +162,7 @@ impl Stage<'_> {
                 let ground = relief(&self.ground, &self.tints, at, position.z as f32, footprint, to_sun, wet);
                 paper.lerp(ground, self.ground.known(at))
             }
+            Ahead::Wall(wall) => paper * (0.62 + 0.12 * wall.normal.dot(self.sun).max(0.0)),
             _ => paper,
         };
         Shaded { light, through: Vec3::ONE, sky: matches!(ahead, Ahead::Sky), ..Shaded::default() }
@@ -245,7 +260,9 @@ impl Stage<'_> {
         };
         if self.scene.style == Style::Tint {
             let wet = self.scene.water.is_some_and(|w| w.covers(at));
-            return even(self.tints.colour(position.z as f32, wet));
+            let Material { albedo, openness, .. } = even(self.tints.colour(position.z as f32, wet));
+            let normal = normal_of_slope(surface.slope * self.tints.steepening());
+            return Material { albedo, normal, openness, wet: 0.0 };
         }
         if let (Style::Image, Some(drape)) = (self.scene.style, self.scene.drape) {
             let span = f64::from(footprint);

@@ -1,6 +1,7 @@
 //! A scene made ready for pictures, and the tiles that pictures are made of.
 
 use super::atmosphere::{Atmosphere, EARTH, Sky};
+use super::block::{MIST, Wall};
 use super::cartography::Tints;
 use super::ground::Ground;
 use super::sampler::Sampler;
@@ -59,7 +60,7 @@ impl<'a> Stage<'a> {
         let sun = scene.sun.direction(scene.north).as_vec3();
         // On maps the bed is ground like any other, and water only a colour.
         let map = matches!(scene.style, Style::Tint | Style::Relief);
-        let ground = Ground::new(scene.land, scene.water.filter(|_| !map));
+        let ground = Ground::new(scene.land, scene.water.filter(|_| !map), scene.border);
         let air = Atmosphere::new(&scene.air, &scene.sun);
         let range = scene.land.height_range();
         let level = scene.water.map_or(f32::NEG_INFINITY, |w| w.level as f32);
@@ -67,7 +68,7 @@ impl<'a> Stage<'a> {
         let sky = Sky::new(&air, &scene.sun, sun, middle.max(2.0));
         let skylight = Skylight::new(&ground, &air, &sky, sun, Vec3::new(0.150, 0.130, 0.090));
         let open = irradiance(&skylight.open, Vec3::Z);
-        let mist = 0.42 / std::f32::consts::PI * (air.sunlight(middle.max(0.0)) * sun.z.max(0.0) + open);
+        let mist = MIST / std::f32::consts::PI * (air.sunlight(middle.max(0.0)) * sun.z.max(0.0) + open);
         let tints = Tints::of(&ground, range, level);
         Stage { scene: *scene, tints, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
     }
@@ -103,6 +104,9 @@ impl<'a> Stage<'a> {
             Style::Tint => Medium::Model,
             Style::Relief => Medium::Paper,
         };
+        if self.ground.block.is_some() || picture.medium == Medium::Model {
+            picture.white = (self.mist / MIST).to_array();
+        }
         for (i, pixels) in rendered.iter().enumerate() {
             let corner = UVec2::new(i as u32 % tiles.x, i as u32 / tiles.x) * TILE;
             let width = (view.size.x - corner.x).min(TILE) as usize;
@@ -159,7 +163,10 @@ impl<'a> Stage<'a> {
                 if s == samples as usize {
                     *middle = match ahead {
                         Ahead::Sky => None,
-                        Ahead::Mist { position } | Ahead::Water { position } => Some((position, Vec3::Z)),
+                        Ahead::Mist { position } | Ahead::Water { position } | Ahead::Floor { position } => {
+                            Some((position, Vec3::Z))
+                        }
+                        Ahead::Wall(wall) => Some((wall.position, wall.normal)),
                         Ahead::Ground { position } => {
                             Some((position, self.ground.land.normal_at(position.truncate()).unwrap_or(Vec3::Z)))
                         }
@@ -213,6 +220,12 @@ impl<'a> Stage<'a> {
     fn ahead(&self, eye: DVec3, direction: Vec3, ground: f32) -> Ahead {
         let direction = direction.as_dvec3();
         let ground = f64::from(ground);
+        if let Some(block) = &self.ground.block {
+            let level = |at| self.level_within(at);
+            if let Some(wall) = block.wall(&self.ground.land, eye, direction, &level) {
+                return Ahead::Wall(wall);
+            }
+        }
         if let Some(water) = self.scene.water.filter(|_| !self.is_map()) {
             // Still water is level; beyond the raster it bends with the Earth, which sets the horizon.
             let rise = eye.z - water.level;
@@ -223,7 +236,11 @@ impl<'a> Stage<'a> {
                     let origin = self.scene.land.origin();
                     at.cmpge(origin).all() && at.cmple(origin + self.scene.land.extent()).all()
                 };
-                let distance = if within { Some(flat) } else { curved(rise, direction) };
+                let distance = match within {
+                    true => Some(flat),
+                    false if self.ground.block.is_some() => None,
+                    false => curved(rise, direction),
+                };
                 if let Some(t) = distance
                     && t <= ground * (1.0 + 1e-7)
                     && water.covers((eye + direction * t).truncate())
@@ -233,7 +250,20 @@ impl<'a> Stage<'a> {
             }
         }
         if ground.is_finite() {
-            return Ahead::Ground { position: eye + direction * ground };
+            let position = eye + direction * ground;
+            let at = position.truncate();
+            if let Some(block) = self.ground.block.filter(|_| self.ground.is_side(at)) {
+                let tall = self.ground.land.height_range();
+                // What was cut away lies on the floor, but for rounding.
+                if position.z < block.floor + 1e-4 * f64::from(tall.high - tall.low) {
+                    return Ahead::Floor { position };
+                }
+                return Ahead::Wall(Wall { position, normal: self.ground.outward(at), ground: position.z });
+            }
+            return Ahead::Ground { position };
+        }
+        if let Some(block) = &self.ground.block {
+            return block.floor(eye, direction).map_or(Ahead::Sky, |position| Ahead::Floor { position });
         }
         let rise = eye.z - self.ground.mist;
         match curved(rise, direction) {
