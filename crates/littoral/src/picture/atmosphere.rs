@@ -38,12 +38,15 @@ pub struct Atmosphere {
     sun_sine: f32,
     transmittance: Vec<Spectrum>,
     many: Vec<Spectrum>,
+    /// Sunlight on a facing surface, by height.
+    sunlight: Vec<Vec3>,
 }
 
 const T_HEIGHTS: usize = 48;
 const T_ANGLES: usize = 192;
 const M_HEIGHTS: usize = 24;
 const M_ANGLES: usize = 32;
+const S_HEIGHTS: usize = 256;
 
 impl Atmosphere {
     /// Air of some visibility under a sun of some elevation.
@@ -67,6 +70,7 @@ impl Atmosphere {
             sun_sine: sun.elevation.sin() as f32,
             transmittance: Vec::new(),
             many: Vec::new(),
+            sunlight: Vec::new(),
         };
         atmosphere.transmittance = (0..T_HEIGHTS * T_ANGLES)
             .into_par_iter()
@@ -82,6 +86,12 @@ impl Atmosphere {
                 let sine = 2.0 * x / (M_ANGLES - 1) as f32 - 1.0;
                 let height = (y / (M_HEIGHTS - 1) as f32).powi(2) * (TOP - 1.0);
                 atmosphere.series(EARTH + height, sine)
+            })
+            .collect();
+        atmosphere.sunlight = (0..S_HEIGHTS)
+            .map(|i| {
+                let height = (i as f32 / (S_HEIGHTS - 1) as f32).powi(2) * TOP;
+                (SUNLIGHT * atmosphere.to_sun(height, atmosphere.sun_sine)).rgb().max(Vec3::ZERO)
             })
             .collect();
         atmosphere
@@ -179,7 +189,9 @@ impl Atmosphere {
 
     /// Sunlight on a surface facing the sun at a height (m): linear Rec. 709 (klx).
     pub fn sunlight(&self, height: f32) -> Vec3 {
-        (SUNLIGHT * self.to_sun(height, self.sun_sine)).rgb().max(Vec3::ZERO)
+        let at = (height.clamp(0.0, TOP) / TOP).sqrt() * (S_HEIGHTS - 1) as f32;
+        let i = (at as usize).min(S_HEIGHTS - 2);
+        self.sunlight[i].lerp(self.sunlight[i + 1], at - i as f32)
     }
 }
 

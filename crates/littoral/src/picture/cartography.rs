@@ -13,6 +13,7 @@ use super::ground::Ground;
 use super::texture::decode_srgb;
 use crate::field::HeightRange;
 use glam::{DVec2, Vec2, Vec3};
+use std::sync::LazyLock;
 
 /// Stops of colour: position in [0, 1], hue (degrees), saturation, lightness.
 type Stops = [(f32, f32, f32, f32)];
@@ -78,12 +79,23 @@ impl Tints {
         if wet && height <= self.level {
             // The shelf is a small part of the depth and most of what one looks at.
             let t = ((self.level - height) / (self.level - self.low).max(1e-3)).clamp(0.0, 1.0);
-            return run_through(BED, t.powf(0.6));
+            return look_up(&BED_RUN, t.powf(0.6));
         }
         let foot = self.level.max(self.low);
         let t = ((height - foot) / (self.high - foot).max(1e-3)).clamp(0.0, 1.0);
-        run_through(LAND, t.powf(0.75))
+        look_up(&LAND_RUN, t.powf(0.75))
     }
+}
+
+/// A run of colours in steps so small that a straight line between them is as good.
+type Run = [Vec3; 1025];
+static LAND_RUN: LazyLock<Run> = LazyLock::new(|| std::array::from_fn(|i| run_through(LAND, i as f32 / 1024.0)));
+static BED_RUN: LazyLock<Run> = LazyLock::new(|| std::array::from_fn(|i| run_through(BED, i as f32 / 1024.0)));
+
+fn look_up(run: &Run, t: f32) -> Vec3 {
+    let at = t.clamp(0.0, 1.0) * 1024.0;
+    let i = (at as usize).min(1023);
+    run[i].lerp(run[i + 1], at - i as f32)
 }
 
 /// The linear colour at `t` along stops.

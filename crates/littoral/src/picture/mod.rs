@@ -30,6 +30,7 @@ mod skylight;
 mod spectrum;
 mod stage;
 mod texture;
+mod tile;
 mod water;
 
 pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
@@ -182,7 +183,7 @@ pub enum Border {
 /// How a picture is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Rays through each pixel, at least 1.
+    /// Rays through each pixel, at least 1. Where the first few agree the others are spared.
     pub samples: u32,
     /// Which random pattern; pictures of the same seed are the same to the bit.
     pub seed: u32,

@@ -7,10 +7,10 @@ use super::cartography::relief;
 use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, Site, natural};
-use super::sampler::Sampler;
+use super::sampler::Pattern;
 use super::sea::{Ripples, fresnel, glitter, refract, ripples};
 use super::skylight::irradiance;
-use super::stage::{HIGHEST_EYE, Lens, Stage, purpose};
+use super::stage::{HIGHEST_EYE, Lens, Stage};
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -73,8 +73,8 @@ pub struct Near {
     veil: Option<(f32, Veil)>,
 }
 
-/// Samples that share one look-up.
-const SHARED: u32 = 4;
+/// Samples that share one look-up. Of a pixel's first four each half has its own, so that they can disagree.
+const SHARED: u32 = 2;
 
 /// A piece of ground, lit by the sky.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +105,7 @@ impl Stage<'_> {
         lens: &Lens,
         direction: Vec3,
         ahead: &Ahead,
-        sampler: Sampler,
+        pattern: Pattern,
         index: u32,
         near: &mut Near,
     ) -> Shaded {
@@ -125,10 +125,10 @@ impl Stage<'_> {
         };
         let distance = (position - lens.eye).length() as f32;
         let mut shaded = match ahead {
-            Ahead::Water { .. } => self.water(lens, direction, position, distance, sampler, index, near),
-            Ahead::Ground { .. } => self.ground(lens, direction, position, distance, sampler, index, near),
-            Ahead::Wall(wall) => self.cut(lens, direction, wall, self.to_sun(sampler, index)),
-            Ahead::Floor { .. } => self.floor(lens, position, self.to_sun(sampler, index)),
+            Ahead::Water { .. } => self.water(lens, direction, position, distance, pattern, index, near),
+            Ahead::Ground { .. } => self.ground(lens, direction, position, distance, pattern, index, near),
+            Ahead::Wall(wall) => self.cut(lens, direction, wall, self.to_sun(pattern, index)),
+            Ahead::Floor { .. } => self.floor(lens, position, self.to_sun(pattern, index)),
             _ => Shaded { light: self.mist, ..Shaded::default() },
         };
         shaded.through = Vec3::ONE;
@@ -175,9 +175,9 @@ impl Stage<'_> {
     }
 
     /// A direction to a random point of the sun's disc.
-    fn to_sun(&self, sampler: Sampler, index: u32) -> Vec3 {
+    fn to_sun(&self, pattern: Pattern, index: u32) -> Vec3 {
         let across = self.sun.any_orthonormal_vector();
-        let disc = sampler.disc(index, purpose::SUN) * self.scene.sun.angular_radius as f32;
+        let disc = pattern.disc(index) * self.scene.sun.angular_radius as f32;
         (self.sun + across * disc.x + self.sun.cross(across) * disc.y).normalize()
     }
 
@@ -188,7 +188,7 @@ impl Stage<'_> {
         direction: Vec3,
         position: DVec3,
         distance: f32,
-        sampler: Sampler,
+        pattern: Pattern,
         index: u32,
         near: &mut Near,
     ) -> Shaded {
@@ -214,7 +214,7 @@ impl Stage<'_> {
             let lift = 0.02 * self.ground.spacing() + 1.5e-4 * distance;
             shaded.sunlit = facet.sunlit;
             let origin = (position - lens.eye).as_vec3() + facet.smooth * lift;
-            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
+            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
         }
         if known < 1.0 {
             shaded.light = self.mist.lerp(shaded.light, known);
@@ -286,7 +286,7 @@ impl Stage<'_> {
         direction: Vec3,
         position: DVec3,
         distance: f32,
-        sampler: Sampler,
+        pattern: Pattern,
         index: u32,
         near: &mut Near,
     ) -> Shaded {
@@ -302,7 +302,7 @@ impl Stage<'_> {
                 pool
             }
         };
-        let slope = pool.ripples.slope + pool.ripples.variance.sqrt() * sampler.normal(index, purpose::RIPPLE);
+        let slope = pool.ripples.slope + pool.ripples.variance.sqrt() * pattern.ripple(index);
         let facet = normal_of_slope(slope);
         let facet = if facet.dot(eye) > 0.02 { facet } else { Vec3::Z };
         let share = fresnel(facet.dot(eye));
@@ -322,7 +322,7 @@ impl Stage<'_> {
         if self.sun.z > 0.0 {
             shaded.sunlit =
                 pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &pool.ripples) * film);
-            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
+            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
         }
         if pool.open < 1.0 {
             shaded.light = self.mist.lerp(shaded.light, pool.open);
