@@ -121,7 +121,7 @@ impl Atmosphere {
             depth += (last.1 + here) * (0.5 * (t - last.0));
             last = (t, here);
         }
-        depth.map(|d| (-d).exp())
+        depth.through()
     }
 
     /// Share of sunlight that reaches height (m), where the sun's centre has elevation of this sine: 0 when the Earth is
@@ -167,7 +167,7 @@ impl Atmosphere {
                 let densities = self.densities(height);
                 let extinction = self.extinction(densities);
                 let scattering = self.rayleigh * densities.0 + self.mie * (MIE_ALBEDO * densities.1);
-                let survives = extinction.map(|e| (-e * (t1 - t0)).exp());
+                let survives = (extinction * (t1 - t0)).through();
                 let weight = through * slab(extinction, survives, t1 - t0);
                 second += weight * scattering * self.to_sun(height, up.dot(sun)) * (1.0 / (4.0 * PI));
                 kept += weight * scattering;
@@ -390,7 +390,7 @@ fn march(air: &Atmosphere, r: f32, direction: Vec3, sun: Vec3, white: Vec3) -> V
                 let up = (Vec3::Z * r + direction * t).normalize();
                 let densities = air.densities(height);
                 let extinction = air.extinction(densities);
-                let survives = extinction.map(|e| (-e * step).exp());
+                let survives = (extinction * step).through();
                 let weight = through * slab(extinction, survives, step);
                 let sine = up.dot(sun);
                 let lit = weight * air.to_sun(height, sine);

@@ -41,7 +41,7 @@ const FIELD: f64 = 0.62;
 /// Share of the outline that lies in the sea above which land is an island, whose sea goes on to the horizon.
 const ISLAND: f64 = 0.9;
 /// How good a landscape has to be, lest a model be better.
-const GOOD: f64 = 4.0;
+const GOOD: f64 = 3.58;
 /// Relief as a share of the land's width above which heights and distances can hardly be in the same unit, or nobody knows the
 /// distances: grey values as heights in a picture without a place. True walls and gorges stay below.
 const ABSURD: f64 = 1.2;
@@ -90,9 +90,6 @@ fn landscape(land: &Land, water: Option<&Water>, ground: &Ground, size: UVec2) -
         .map(|&i| (judge(ground, water, &candidates[i], larger), i))
         .reduce(|| (f64::NEG_INFINITY, usize::MAX), |a, b| if (b.0, a.1) > (a.0, b.1) { b } else { a });
     let camera = candidates.get(best.1)?;
-    if std::env::var_os("SCORES").is_some() {
-        eprintln!("landscape {}", best.0);
-    }
     let shot = Shot {
         view: camera.view(size),
         sun: Sun::new(camera.sun_bearing, 21f64.to_radians()),
@@ -379,6 +376,10 @@ fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -
     let mean = skyline.iter().sum::<f64>() / skyline.len() as f64;
     let shape =
         (skyline.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / skyline.len() as f64).sqrt() / f64::from(size.y);
+    // The summit wants some sky above it, and neither the middle of the frame nor its edge.
+    let summit = (0..skyline.len()).min_by(|a, b| skyline[*a].total_cmp(&skyline[*b])).unwrap_or(0);
+    let headroom = skyline[summit] / f64::from(size.y);
+    let aside = ((summit as f64 + 0.5) / skyline.len() as f64 - 0.5).abs();
     let within = |value: f64, best: f64, width: f64| (-((value - best) / width).powi(2)).exp();
     1.5 * (contrast / 0.22).min(1.2)
         + 1.5 * (layers / 0.7).min(1.2)
@@ -387,6 +388,8 @@ fn judge(ground: &Ground, water: Option<&Water>, camera: &Camera, size: UVec2) -
         + if water.is_some() { 0.8 * within(wet, 0.28, 0.20) } else { 0.0 }
         + 0.8 * land_share.min(0.5)
         - 5.0 * missing
+        - 0.8 * (0.14 - headroom).max(0.0) / 0.14
+        - 0.6 * (aside - 0.30).max(0.0) / 0.20
         - 3.0 * (0.12 - land_share).max(0.0) / 0.12
         - 1.5 * (1.0 - nearest / (0.13 * extent)).max(0.0)
 }

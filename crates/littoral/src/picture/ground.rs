@@ -193,10 +193,12 @@ impl<'a> Ground<'a> {
         ((footprint / self.spacing()).max(1.0).log2().round() as usize).min(self.means.len())
     }
 
-    /// The mean height about a world position (m) on a [level](Ground::level_of) of the pyramid: one bilinear read.
-    pub fn mean(&self, at: DVec2, level: usize) -> f32 {
-        let (heights, columns, rows, spacing) = self.level(level);
-        let p = ((at - self.land.origin()) / spacing).as_vec2();
+    /// The mean height about a place on a [level](Ground::level_of) of the pyramid: one bilinear read. The place counts samples of
+    /// the finest level from the origin.
+    #[inline]
+    pub fn mean(&self, place: Vec2, level: usize) -> f32 {
+        let (heights, columns, rows) = self.heights(level);
+        let p = place * (1.0 / (1u64 << level) as f32);
         let p = p.clamp(Vec2::ZERO, Vec2::new((columns - 1) as f32, (rows - 1) as f32));
         let (i, j) = ((p.x as usize).min(columns - 2), (p.y as usize).min(rows - 2));
         let (u, v) = (p.x - i as f32, p.y - j as f32);
@@ -206,47 +208,48 @@ impl<'a> Ground<'a> {
         a + (b - a) * v
     }
 
-    fn level(&self, level: usize) -> (&[f32], usize, usize, DVec2) {
-        let raster = self.land.raster();
+    /// Heights, columns and rows of a level of the pyramid.
+    fn heights(&self, level: usize) -> (&[f32], usize, usize) {
         match level.checked_sub(1) {
             None => {
+                let raster = self.land.raster();
                 let heights = if self.uncut.is_empty() { raster.heights() } else { &self.uncut };
-                (heights, raster.columns(), raster.rows(), raster.spacing())
+                (heights, raster.columns(), raster.rows())
             }
-            Some(k) => {
-                let means = &self.means[k];
-                (&means.heights, means.columns, means.rows, raster.spacing() * (1u64 << level) as f64)
-            }
+            Some(k) => (&self.means[k].heights, self.means[k].columns, self.means[k].rows),
         }
     }
 
     fn surface_of(&self, at: DVec2, level: usize) -> Surface {
-        let (heights, columns, rows, spacing) = self.level(level);
+        let (heights, columns, rows) = self.heights(level);
+        let spacing = self.land.raster().spacing() * (1u64 << level) as f64;
         let last = DVec2::new((columns - 1) as f64, (rows - 1) as f64);
         let p = ((at - self.land.origin()) / spacing).clamp(DVec2::ZERO, last);
         let (i, j) = ((p.x as usize).min(columns - 2), (p.y as usize).min(rows - 2));
         let (u, v) = ((p.x - i as f64) as f32, (p.y - j as f64) as f32);
-        let mut h = [[0.0f32; 4]; 4];
-        for (dj, row) in h.iter_mut().enumerate() {
-            let base = (j + dj).saturating_sub(1).min(rows - 1) * columns;
-            for (di, cell) in row.iter_mut().enumerate() {
-                *cell = heights[base + (i + di).saturating_sub(1).min(columns - 1)];
-            }
-        }
+        let line = |dj: usize| (j + dj).saturating_sub(1).min(rows - 1) * columns;
+        let (west, east) = (i.saturating_sub(1), (i + 2).min(columns - 1));
+        let row = |dj: usize| {
+            let base = line(dj);
+            [heights[base + west], heights[base + i], heights[base + i + 1], heights[base + east]]
+        };
+        let (h0, h1, h2, h3) = (row(0), row(1), row(2), row(3));
+        // Bilinear between the four samples about the point, of what central differences say at each.
+        let across = |h: [f32; 4]| h[1] + (h[2] - h[1]) * u;
+        let rise = |h: [f32; 4]| (h[2] - h[0]) + ((h[3] - h[1]) - (h[2] - h[0])) * u;
+        let bend = |h: [f32; 4]| {
+            let (a, b) = (h[0] + h[2] - 2.0 * h[1], h[1] + h[3] - 2.0 * h[2]);
+            a + (b - a) * u
+        };
+        let (m0, m1, m2, m3) = (across(h0), across(h1), across(h2), across(h3));
         let (sx, sy) = (1.0 / spacing.x as f32, 1.0 / spacing.y as f32);
-        let mut surface = Surface::default();
-        for (dj, wj) in [(1, 1.0 - v), (2, v)] {
-            for (di, wi) in [(1, 1.0 - u), (2, u)] {
-                let w = wi * wj;
-                let (west, east) = (h[dj][di - 1], h[dj][di + 1]);
-                let (south, north) = (h[dj - 1][di], h[dj + 1][di]);
-                surface.height += w * h[dj][di];
-                surface.slope += w * 0.5 * Vec2::new((east - west) * sx, (north - south) * sy);
-                let curve = (east + west - 2.0 * h[dj][di]) * sx * sx + (north + south - 2.0 * h[dj][di]) * sy * sy;
-                surface.hollow += w * 0.5 * curve;
-            }
+        let mix = |a: f32, b: f32| a + (b - a) * v;
+        let along = mix(m0 + m2 - 2.0 * m1, m1 + m3 - 2.0 * m2);
+        Surface {
+            height: mix(m1, m2),
+            slope: 0.5 * Vec2::new(mix(rise(h1), rise(h2)) * sx, mix(m2 - m0, m3 - m1) * sy),
+            hollow: 0.5 * (mix(bend(h1), bend(h2)) * sx * sx + along * sy * sy),
         }
-        surface
     }
 }
 

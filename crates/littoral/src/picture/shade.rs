@@ -11,6 +11,7 @@ use super::sampler::Pattern;
 use super::sea::{Ripples, fresnel, glitter, refract, ripples};
 use super::skylight::irradiance;
 use super::stage::{HIGHEST_EYE, Lens, Stage};
+use super::tile::FIRST;
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -73,8 +74,10 @@ pub struct Near {
     veil: Option<(f32, Veil)>,
 }
 
-/// Samples that share one look-up. Of a pixel's first four each half has its own, so that they can disagree.
-const SHARED: u32 = 2;
+/// Samples that share one look-up: two of the first few, so that these can disagree, and four of the others.
+fn shared(index: u32) -> u32 {
+    if index < FIRST { 2 } else { 4 }
+}
 
 /// A piece of ground, lit by the sky.
 #[derive(Clone, Copy, Debug)]
@@ -196,8 +199,8 @@ impl Stage<'_> {
         if known == 0.0 {
             return Shaded { light: self.mist, ..Shaded::default() };
         }
-        // The lines of a map are finer than a footprint: every sample looks for itself.
-        let shared = if self.is_map() { 1 } else { SHARED };
+        // The lines of a map are finer than a footprint: where samples disagree every one looks for itself.
+        let shared = if self.is_map() && index >= FIRST { 1 } else { shared(index) };
         let facet = match near.ground {
             Some((at, uses, facet)) if uses < shared && close(at, distance, 0.02) => {
                 near.ground = Some((at, uses + 1, facet));
@@ -226,11 +229,16 @@ impl Stage<'_> {
     /// The ground at a place, as a pixel sees it.
     fn facet(&self, lens: &Lens, direction: Vec3, position: DVec3, distance: f32) -> Facet {
         let at = position.truncate();
-        let rough = self.ground.surface(at, distance * lens.pixel);
-        let normal_of = |s: &Surface| Vec3::new(-s.slope.x, -s.slope.y, 1.0).normalize();
-        let footprint = self.footprint(lens, distance, -direction.dot(normal_of(&rough)));
+        let cosine = match self.is_map() {
+            true => -direction.z,
+            false => {
+                let rough = self.ground.surface(at, distance * lens.pixel);
+                -direction.dot(normal_of_slope(rough.slope))
+            }
+        };
+        let footprint = self.footprint(lens, distance, cosine);
         let surface = self.ground.surface(at, footprint);
-        let smooth = normal_of(&surface);
+        let smooth = normal_of_slope(surface.slope);
         let material = self.material(position, &surface, footprint);
         let sky = irradiance(&self.skylight.at(at), material.normal) * material.openness;
         let mut skylit = material.albedo / PI * sky;
@@ -292,7 +300,7 @@ impl Stage<'_> {
     ) -> Shaded {
         let eye = -direction;
         let pool = match near.water {
-            Some((at, uses, pool)) if uses < SHARED && close(at, distance, 0.02) => {
+            Some((at, uses, pool)) if uses < shared(index) && close(at, distance, 0.02) => {
                 near.water = Some((at, uses + 1, pool));
                 pool
             }

@@ -17,11 +17,11 @@ use std::ops::Range;
 /// Side of a tile (pixels).
 pub const TILE: u32 = 16;
 /// Samples that every pixel gets, and the share of all that it does at least.
-const FIRST: u32 = 4;
+pub const FIRST: u32 = 4;
 const LEAST_SHARE: u32 = 4;
 /// Contrast (largest over smallest luminance, less one) that calls for all samples: between those of a pixel, and between neighbours.
-const DISAGREE: f32 = 0.10;
-const DIFFER: f32 = 0.16;
+const DISAGREE: f32 = 0.12;
+const DIFFER: f32 = 0.18;
 
 /// One finished pixel.
 pub struct Pixel {
