@@ -7,7 +7,9 @@ use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::{Land, coast};
-use littoral::picture::{self, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water};
+use littoral::picture::{
+    self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water,
+};
 use littoral::space::{Ray, View};
 use littoral_data::write::{self, Layer, PngPixels};
 use serde::Serialize;
@@ -191,7 +193,12 @@ impl Render {
         }
 
         let subject = self.subject(file.as_deref(), talk)?;
-        let (shot, look) = self.shot(&subject, file.is_none(), talk)?;
+        let (mut shot, look) = self.shot(&subject, file.is_none(), talk)?;
+        let film = self.film(&out, &shot);
+        if let Some(film) = &film {
+            shot.shot.border = film.border(&subject)?;
+            shot.shot.air.veils_distance = shot.border == Border::Mist || self.visibility.is_some();
+        }
         let drape = self.texture.as_ref().map(|texture| drape(texture, &subject, talk)).transpose()?;
         let scene = Scene {
             drape: drape.as_ref(),
@@ -201,19 +208,8 @@ impl Render {
         };
         let stage = Stage::new(&scene);
         let settings = Settings { samples: self.samples, seed: self.seed };
-        if self.path.is_some() {
-            let order = film::Order {
-                path: self.path.as_deref().filter(|p| *p != Path::new("orbit")),
-                seconds: self.seconds,
-                fps: self.fps,
-                save: self.save_path.as_deref(),
-                out: &out.file,
-                folder: out.kind == Kind::Frames,
-                look: format!("{:?} {:?} {:?} water {:?}", shot.sun, shot.air, shot.style, self.water),
-                field: shot.field,
-                size: self.size,
-            };
-            return order.run(&subject, &stage, &settings, started, talk);
+        if let Some(film) = film {
+            return film.run(&subject, &stage, &settings, started, talk);
         }
 
         let bar = progress(1000, "rendering");
@@ -254,6 +250,24 @@ impl Render {
             tidy(self.exaggeration, 2),
             subject.datum
         ))
+    }
+
+    /// The film that is wanted, if one is.
+    fn film<'a>(&'a self, out: &'a Output, shot: &Framed) -> Option<film::Order<'a>> {
+        /// Vertical angle of view (rad) of a moderate wide-angle lens: a film moves, whatever lens a still picture has.
+        const LENS: f64 = 0.62;
+        let path = self.path.as_deref()?;
+        Some(film::Order {
+            path: Some(path).filter(|p| *p != Path::new("orbit")),
+            seconds: self.seconds,
+            fps: self.fps,
+            save: self.save_path.as_deref(),
+            out: &out.file,
+            folder: out.kind == Kind::Frames,
+            look: format!("{:?} {:?} {:?} water {:?}", shot.sun, shot.air, shot.style, self.water),
+            field: self.fov.map_or(LENS, f64::to_radians),
+            size: self.size,
+        })
     }
 
     /// Sorts out what a parser cannot: `--path dem.tif` without another file means the file, and an orbit.

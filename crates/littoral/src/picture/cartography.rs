@@ -154,7 +154,7 @@ pub fn relief(ground: &Ground, tints: &Tints, at: DVec2, height: f32, footprint:
     let tone = ((shade - 0.64) / 0.36).clamp(-1.8, 1.0) * contrast;
     let paper = match below {
         true => hsl(204.0, 0.42, 0.70 + 0.16 * elevation),
-        false => hsl(86.0, 0.17, 0.76).lerp(hsl(42.0, 0.46, 0.87), elevation.powf(0.7)),
+        false => hsl(86.0, 0.20, 0.69).lerp(hsl(42.0, 0.46, 0.82), elevation.powf(0.7)),
     };
     if tone > 0.0 {
         paper.lerp(hsl(50.0, 0.85, 0.95), tone.min(1.0) * 0.75)

@@ -67,7 +67,10 @@ pub fn compose(land: &Land, water: Option<&Water>, size: UVec2) -> Shot {
     if f64::from(range.high - range.low) > ABSURD * land.extent().min_element() {
         return Shot { style: Style::Relief, ..overhead(land, water, size) };
     }
-    let landscape = landscape(land, water, &ground, size).filter(|(_, score)| *score >= GOOD);
+    // A small raster shows its samples near the eye.
+    let (columns, rows) = (land.raster().columns(), land.raster().rows());
+    let coarse = 0.3 * (1.0 - columns.min(rows) as f64 / 256.0).max(0.0);
+    let landscape = landscape(land, water, &ground, size).filter(|(_, score)| *score - coarse >= GOOD);
     match landscape {
         Some((shot, _)) => shot,
         None => model(land, water, slope, size),

@@ -145,7 +145,8 @@ pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climat
             + 0.6 * patch(beds, 4.1, footprint / tall, 11)
             + 0.35 * patch(beds, 1.3, footprint / tall, 13);
         let joint_at = DVec3::new(at.x, at.y, 0.16 * at.z) / (8.5 * level);
-        let split = resolved(8.5 * tall, footprint) * cliff;
+        // Joints as wide as a valley would look like worms.
+        let split = resolved(8.5 * tall, footprint) * cliff * (1.0 - step(6.0, 16.0, spacing));
         let joints = grain(joint_at, 14);
         let crack = split * step(0.16, 0.0, joints.value.abs());
         let lean = joints.gradient * Vec3::new(0.42, 0.42, 0.07) * split;
