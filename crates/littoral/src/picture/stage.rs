@@ -10,7 +10,7 @@ use super::shade::Ahead;
 use super::skylight::{Skylight, irradiance};
 use super::tile::{Mosaic, Pixel, TILE};
 use super::{Medium, Picture, Scene, Settings, Style};
-use crate::raycast::RayCaster;
+use crate::raycast::{LocalRay, RayCaster};
 use crate::space::View;
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
@@ -32,6 +32,24 @@ pub struct Stage<'a> {
     pub(super) tints: Tints,
 }
 
+/// Casts many rays whose origins count from the eye. There is one for pictures, and one for tests that shows it right.
+pub(super) trait Caster: Sync {
+    /// Distances (m) to the first hits, infinity for none.
+    fn first_hits(&self, rays: &[LocalRay], distances: &mut [f32]);
+    /// Whether anything is hit.
+    fn any_hits(&self, rays: &[LocalRay], hits: &mut [bool]);
+}
+
+impl Caster for RayCaster<'_> {
+    fn first_hits(&self, rays: &[LocalRay], distances: &mut [f32]) {
+        RayCaster::first_hits(self, rays, distances);
+    }
+
+    fn any_hits(&self, rays: &[LocalRay], hits: &mut [bool]) {
+        RayCaster::any_hits(self, rays, hits);
+    }
+}
+
 /// What a view adds to a stage.
 pub(super) struct Lens<'a> {
     /// The sky and its veil as the eye sees them.
@@ -40,7 +58,7 @@ pub(super) struct Lens<'a> {
     /// Angle that a pixel covers (rad).
     pub pixel: f32,
     /// Casts rays whose origins count from the eye.
-    pub caster: RayCaster<'a>,
+    pub caster: &'a dyn Caster,
 }
 
 impl<'a> Stage<'a> {
@@ -69,11 +87,22 @@ impl<'a> Stage<'a> {
 
     /// What `view` sees. `progress` is told the fraction done, now and then, from any thread.
     pub fn render(&self, view: &View, settings: &Settings, progress: &(dyn Fn(f32) + Sync)) -> Picture {
+        self.render_with(&self.ground.land.caster(view.eye), view, settings, progress)
+    }
+
+    /// What `view` sees by the rays of some caster.
+    pub(super) fn render_with(
+        &self,
+        caster: &dyn Caster,
+        view: &View,
+        settings: &Settings,
+        progress: &(dyn Fn(f32) + Sync),
+    ) -> Picture {
         let lens = Lens {
             sky: Sky::new(&self.air, &self.scene.sun, self.sun, view.eye.z.clamp(2.0, HIGHEST_EYE) as f32),
             eye: view.eye,
             pixel: 1.0 / view.pixels_per_radian,
-            caster: self.ground.land.caster(view.eye),
+            caster,
         };
         let tiles = UVec2::new(view.size.x.div_ceil(TILE), view.size.y.div_ceil(TILE));
         let count = tiles.x as usize * tiles.y as usize;

@@ -210,3 +210,117 @@ fn settled(sums: &[Sum], width: usize, i: usize) -> bool {
         && (row == 0 || alike(i - width))
         && (i + width >= sums.len() || alike(i + width))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::noise::Fbm;
+    use crate::field::{Land, Raster};
+    use crate::picture::stage::Caster;
+    use crate::picture::{Border, Picture, Scene, Style, Sun, Water};
+    use crate::raycast::Hit;
+    use crate::space::Ray;
+    use glam::DVec2;
+
+    /// Rays one at a time in `f64`, by the pyramid or past it.
+    struct OneByOne<'a> {
+        land: &'a Land,
+        eye: DVec3,
+        cast: fn(&Land, &Ray) -> Option<Hit>,
+    }
+
+    impl OneByOne<'_> {
+        fn distance(&self, ray: &LocalRay) -> f32 {
+            let (origin, direction) = (self.eye + ray.origin.as_dvec3(), ray.direction.as_dvec3());
+            let ray = Ray { origin, direction, reach: f64::from(ray.reach) };
+            (self.cast)(self.land, &ray).map_or(f32::INFINITY, |hit| hit.distance as f32)
+        }
+    }
+
+    impl Caster for OneByOne<'_> {
+        fn first_hits(&self, rays: &[LocalRay], distances: &mut [f32]) {
+            rays.iter().zip(distances).for_each(|(ray, distance)| *distance = self.distance(ray));
+        }
+
+        fn any_hits(&self, rays: &[LocalRay], hits: &mut [bool]) {
+            rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.distance(ray) < f32::INFINITY);
+        }
+    }
+
+    /// Hills of noise with a lake's worth of sea, and with voids in the middle and at the edge if asked for.
+    fn hills(seed: u32, voids: bool) -> Land {
+        let fbm = Fbm::new(11.0, 9.0, 5, seed);
+        let (columns, rows) = (29, 23);
+        let heights = (0..columns * rows).map(|i| {
+            let (x, y) = (i % columns, i / columns);
+            let hole = voids && ((9..13).contains(&x) && (5..9).contains(&y) || x + y < 6);
+            if hole { f32::NAN } else { (10.0 * fbm.at(DVec2::new(x as f64, y as f64)).value) as f32 + 8.0 }
+        });
+        Land::new(Raster::new(columns, rows, DVec2::new(10.0, 14.0), heights.collect()).expect("valid"))
+    }
+
+    fn bits(picture: &Picture) -> Vec<u32> {
+        let planes = [&picture.radiance, &picture.normal, &picture.position].into_iter().flatten().flatten();
+        planes.chain(&picture.depth).chain(&picture.height).chain(&picture.coverage).map(|v| v.to_bits()).collect()
+    }
+
+    #[test]
+    fn the_picture_is_that_of_walking_every_patch() {
+        for (seed, voids, border, style) in [
+            (1, false, Border::Mist, Style::Natural),
+            (2, true, Border::Mist, Style::Natural),
+            (3, true, Border::Cut, Style::Natural),
+            (4, false, Border::Cut, Style::Tint),
+            (5, true, Border::Cut, Style::Relief),
+        ] {
+            let land = hills(seed, voids);
+            let water = Water::flood(&land, 0.0);
+            let eye = match border {
+                Border::Mist => DVec3::new(-60.0, -90.0, 150.0),
+                Border::Cut => DVec3::new(-260.0, -330.0, 290.0),
+            };
+            let view = View::looking_at(eye, DVec3::new(20.0, 30.0, 0.0), 0.7, UVec2::new(40, 26));
+            let scene = Scene { border, style, sun: Sun::new(4.0, 0.4), ..Scene::new(&land, water.as_ref()) };
+            let stage = Stage::new(&scene);
+            let settings = Settings { samples: 6, seed };
+            let by = |cast| {
+                let caster = OneByOne { land: &stage.ground.land, eye, cast };
+                stage.render_with(&caster, &view, &settings, &|_| {})
+            };
+            let (pyramid, patches) = (by(Land::first_hit), by(Land::first_hit_patch_by_patch));
+            assert!(bits(&pyramid) == bits(&patches), "seed {seed}: the pyramid changes the picture");
+            let hits = patches.depth.iter().filter(|d| d.is_finite()).count();
+            assert!(hits > 400, "seed {seed}: only {hits} pixels of land");
+            // Streams work in single precision: here and there a shadow's edge falls on the other side of a sample.
+            let streams = stage.render(&view, &settings, &|_| {});
+            let light = |p: &Picture| p.radiance.iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
+            let difference: f64 = (streams.radiance.iter().flatten().zip(patches.radiance.iter().flatten()))
+                .map(|(a, b)| f64::from((a - b).abs()))
+                .sum();
+            assert!(difference < 2e-3 * light(&patches), "seed {seed}: streams differ by {difference}");
+            for (a, b) in streams.depth.iter().zip(&patches.depth).filter(|(a, b)| a.is_finite() || b.is_finite()) {
+                assert!((a - b).abs() < 1e-3 * b, "seed {seed}: {a} for {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn only_what_disagrees_gets_all_samples() {
+        let even = |light: f32| {
+            let mut sum = Sum::default();
+            (0..4).for_each(|_| sum.add(Vec3::splat(light), false));
+            sum
+        };
+        let mut sums = vec![even(1.0); 9];
+        assert!((0..9).all(|i| settled(&sums, 3, i)));
+        sums[4] = even(1.5);
+        let unsettled: Vec<usize> = (0..9).filter(|&i| !settled(&sums, 3, i)).collect();
+        assert_eq!(unsettled, [1, 3, 4, 5, 7], "a step, on both of its sides");
+        sums[4] = even(1.0);
+        sums[4].add(Vec3::splat(1.3), false);
+        assert!(!settled(&sums, 3, 4), "a spark");
+        sums[4] = even(1.0);
+        sums[4].add(Vec3::splat(1.0), true);
+        assert!(!settled(&sums, 3, 4), "a skyline");
+    }
+}
