@@ -378,6 +378,15 @@ impl Render {
             false if self.style == Some(StyleName::Relief) => picture::overhead(land, water, self.size),
             false => picture::compose(land, water, self.size),
         };
+        let (range, narrow) = (land.height_range(), land.extent().min_element());
+        let relief = f64::from(range.high - range.low);
+        if !range.is_empty() && relief > 1.2 * narrow && self.exaggeration == 1.0 {
+            let factor = tidy((0.3 * narrow / relief).max(0.01), 2);
+            let (name, relief, narrow) = (&subject.name, tidy(relief, 0), tidy(narrow, 0));
+            talk.warn(format!(
+                "{name}: {relief} m of relief on {narrow} m of land: does the file say how far apart its samples are? --exaggeration {factor} draws it as hills"
+            ));
+        }
         let own_field = 2.0 * (0.5 * f64::from(self.size.y) / f64::from(chosen.view.pixels_per_radian)).atan();
         let field = self.fov.map_or(if self.eye.is_some() { 45f64.to_radians() } else { own_field }, f64::to_radians);
         let Shot { mut view, mut sun, mut air, mut style, mut border } = chosen;

@@ -69,9 +69,46 @@ pub struct Shaded {
 /// already averaged over the pixel's footprint, while edges, shadows and mirrors keep every sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Near {
-    ground: Option<(f32, u32, Facet)>,
-    water: Option<(f32, u32, Pool)>,
-    veil: Option<(f32, Veil)>,
+    ground: Lent<Facet>,
+    water: Lent<Pool>,
+    veil: Lent<Veil>,
+}
+
+/// What was looked up last, at which distance (m), and how many samples have used it.
+#[derive(Clone, Copy, Debug)]
+struct Lent<T>(Option<(f32, u32, T)>);
+
+impl<T> Default for Lent<T> {
+    fn default() -> Lent<T> {
+        Lent(None)
+    }
+}
+
+impl<T: Copy> Lent<T> {
+    /// What was looked up last, if that is within a share of the distance and not yet used `most` times; else `look_up`'s.
+    fn take(&mut self, distance: f32, share: f32, most: u32, look_up: impl FnOnce() -> T) -> T {
+        match &mut self.0 {
+            Some((at, uses, thing)) if *uses < most && (*at - distance).abs() <= share * *at => {
+                *uses += 1;
+                *thing
+            }
+            _ => self.0.insert((distance, 1, look_up())).2,
+        }
+    }
+}
+
+/// One sample's look at something.
+#[derive(Clone, Copy)]
+struct Look<'a> {
+    /// Away from the eye, unit.
+    direction: Vec3,
+    /// What is looked at (m).
+    position: DVec3,
+    /// How far away it is (m).
+    distance: f32,
+    /// The pixel's random numbers, and which of them are the sample's.
+    pattern: Pattern<'a>,
+    index: u32,
 }
 
 /// Samples that share one look-up: two of the first few, so that these can disagree, and four of the others.
@@ -127,27 +164,23 @@ impl Stage<'_> {
             | Ahead::Wall(Wall { position, .. }) => position,
         };
         let distance = (position - lens.eye).length() as f32;
+        let look = Look { direction, position, distance, pattern, index };
         let mut shaded = match ahead {
-            Ahead::Water { .. } => self.water(lens, direction, position, distance, pattern, index, near),
-            Ahead::Ground { .. } => self.ground(lens, direction, position, distance, pattern, index, near),
+            Ahead::Water { .. } => self.water(lens, &look, near),
+            Ahead::Ground { .. } => self.ground(lens, &look, near),
             Ahead::Wall(wall) => self.cut(lens, direction, wall, self.to_sun(pattern, index)),
             Ahead::Floor { .. } => self.floor(lens, position, self.to_sun(pattern, index)),
             _ => Shaded { light: self.mist, ..Shaded::default() },
         };
         shaded.through = Vec3::ONE;
         if self.scene.air.veils_distance {
-            let veil = match near.veil {
-                Some((at, veil)) if close(at, distance, 0.004) => veil,
-                _ => {
-                    let mut through = distance;
-                    if lens.eye.z > HIGHEST_EYE {
-                        through = through.min((HIGHEST_EYE - position.z) as f32 / (-direction.z).max(1e-3));
-                    }
-                    let veil = lens.sky.veil(direction, through);
-                    near.veil = Some((distance, veil));
-                    veil
+            let veil = near.veil.take(distance, 0.004, u32::MAX, || {
+                let mut through = distance;
+                if lens.eye.z > HIGHEST_EYE {
+                    through = through.min((HIGHEST_EYE - position.z) as f32 / (-direction.z).max(1e-3));
                 }
-            };
+                lens.sky.veil(direction, through)
+            });
             (shaded.veil, shaded.through) = (veil.light, veil.through);
         }
         shaded
@@ -184,34 +217,15 @@ impl Stage<'_> {
         (self.sun + across * disc.x + self.sun.cross(across) * disc.y).normalize()
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
-    fn ground(
-        &self,
-        lens: &Lens,
-        direction: Vec3,
-        position: DVec3,
-        distance: f32,
-        pattern: Pattern,
-        index: u32,
-        near: &mut Near,
-    ) -> Shaded {
+    fn ground(&self, lens: &Lens, look: &Look, near: &mut Near) -> Shaded {
+        let Look { direction, position, distance, pattern, index } = *look;
         let known = self.ground.known(position.truncate());
         if known == 0.0 {
             return Shaded { light: self.mist, ..Shaded::default() };
         }
         // The lines of a map are finer than a footprint: where samples disagree every one looks for itself.
         let shared = if self.is_map() && index >= FIRST { 1 } else { shared(index) };
-        let facet = match near.ground {
-            Some((at, uses, facet)) if uses < shared && close(at, distance, 0.02) => {
-                near.ground = Some((at, uses + 1, facet));
-                facet
-            }
-            _ => {
-                let facet = self.facet(lens, direction, position, distance);
-                near.ground = Some((distance, 1, facet));
-                facet
-            }
-        };
+        let facet = near.ground.take(distance, 0.02, shared, || self.facet(lens, direction, position, distance));
         let mut shaded = Shaded { light: facet.skylit, ..Shaded::default() };
         if facet.sunlit != Vec3::ZERO {
             let lift = 0.02 * self.ground.spacing() + 1.5e-4 * distance;
@@ -287,29 +301,10 @@ impl Stage<'_> {
         natural(&site, surface, &broad, &self.scene.climate)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
-    fn water(
-        &self,
-        lens: &Lens,
-        direction: Vec3,
-        position: DVec3,
-        distance: f32,
-        pattern: Pattern,
-        index: u32,
-        near: &mut Near,
-    ) -> Shaded {
+    fn water(&self, lens: &Lens, look: &Look, near: &mut Near) -> Shaded {
+        let Look { direction, position, distance, pattern, index } = *look;
         let eye = -direction;
-        let pool = match near.water {
-            Some((at, uses, pool)) if uses < shared(index) && close(at, distance, 0.02) => {
-                near.water = Some((at, uses + 1, pool));
-                pool
-            }
-            _ => {
-                let pool = self.pool(lens, direction, position, distance);
-                near.water = Some((distance, 1, pool));
-                pool
-            }
-        };
+        let pool = near.water.take(distance, 0.02, shared(index), || self.pool(lens, direction, position, distance));
         let slope = pool.ripples.slope + pool.ripples.variance.sqrt() * pattern.ripple(index);
         let facet = normal_of_slope(slope);
         let facet = if facet.dot(eye) > 0.02 { facet } else { Vec3::Z };
@@ -429,9 +424,4 @@ impl Stage<'_> {
 
 fn normal_of_slope(slope: Vec2) -> Vec3 {
     Vec3::new(-slope.x, -slope.y, 1.0).normalize()
-}
-
-/// Whether two distances differ by no more than a share of the first.
-fn close(a: f32, b: f32, share: f32) -> bool {
-    (a - b).abs() <= share * a
 }
