@@ -59,7 +59,8 @@ pub struct Render {
     /// Coordinates are longitude and latitude in degrees
     #[arg(long, help_heading = "View")]
     lonlat: bool,
-    /// Angle between the picture's lower and upper edge in degrees [default: 45, or what suits a chosen view]
+    /// Angle between the picture's lower and upper edge in degrees [default: 45, or what suits a chosen
+    /// view; 36 for films]
     #[arg(long, value_name = "DEGREES", value_parser = input::field_of_view, help_heading = "View")]
     fov: Option<f64>,
 
@@ -75,7 +76,8 @@ pub struct Render {
     /// Stretch all heights, the eye's too
     #[arg(long, value_name = "FACTOR", value_parser = input::factor, default_value = "1", help_heading = "Look")]
     exaggeration: f64,
-    /// Height of still water in metres, or none. It covers low ground that it can reach from the border of the data
+    /// Height of still water in metres, or none. It covers low ground that it can reach from the border of the data,
+    /// and voids with a rim at that height
     #[arg(long, value_name = "METRES|none", value_parser = input::water, default_value = "0", help_heading = "Look")]
     water: WaterLevel,
     /// How far one sees: 10 in haze, 40 on a clear day, 200 in the clearest air [default: what suits the land]
