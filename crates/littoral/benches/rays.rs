@@ -52,14 +52,20 @@ fn cameras(land: &Land, name: &str, view: View) {
     };
     let rays: Vec<LocalRay> =
         (0..(SIZE.x * SIZE.y) as usize).map(|i| LocalRay::new(Vec3::ZERO, direction(i))).collect();
-    let single: Vec<Ray> = rays.iter().step_by(7).map(|ray| Ray::new(view.eye, ray.direction.as_dvec3())).collect();
+    let exact: Vec<Ray> = rays.iter().step_by(7).map(|ray| Ray::new(view.eye, ray.direction.as_dvec3())).collect();
     let seconds = median(3, || {
-        single.iter().for_each(|ray| {
+        exact.iter().for_each(|ray| {
             black_box(land.first_hit(ray));
         })
     });
-    print!("{name}: single {:.2}", single.len() as f64 / seconds * 1e-6);
+    print!("{name}: exact {:.2}", exact.len() as f64 / seconds * 1e-6);
     let caster = land.caster(view.eye);
+    let seconds = median(5, || {
+        rays.iter().for_each(|ray| {
+            black_box(caster.first_hit(ray));
+        })
+    });
+    print!(", single {:.2}", rays.len() as f64 / seconds * 1e-6);
     let mut distances = vec![0.0; rays.len()];
     let seconds = median(5, || caster.first_hits(&rays, &mut distances));
     print!(", stream {:.2}", rays.len() as f64 / seconds * 1e-6);
@@ -71,7 +77,9 @@ fn cameras(land: &Land, name: &str, view: View) {
     let seconds = median(5, || caster.any_hits(&shadows, &mut shaded));
     print!(", shadow {:.2}", shadows.len() as f64 / seconds * 1e-6);
     let seconds = median(5, || caster.view_hits(&view, Vec2::splat(0.5), 0..SIZE.y, &mut distances));
-    println!(", view {:.2} million rays a second", rays.len() as f64 / seconds * 1e-6);
+    print!(", view {:.2}", rays.len() as f64 / seconds * 1e-6);
+    let seconds = median(5, || caster.view_hits_by_footprint(&view, Vec2::splat(0.5), 1.0, 0..SIZE.y, &mut distances));
+    println!(", by footprint {:.2} million rays a second", rays.len() as f64 / seconds * 1e-6);
 }
 
 /// Heights at random places, and lines of sight between random places 2 m and 400 m above the ground.

@@ -1,10 +1,15 @@
 //! Rays against brute force over all patches, on thousands of small maps.
 
-use glam::{DVec2, DVec3, UVec2, Vec2};
+use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::{HeightField, HeightRange, Land, Raster, Window};
 use littoral::raycast::{LocalRay, Simd};
 use littoral::space::{Cell, Ray, View};
 use proptest::prelude::*;
+
+/// Fewer under Miri, which is a thousand times slower.
+const fn cases(count: u32) -> u32 {
+    if cfg!(miri) { 3 } else { count }
+}
 
 /// Corner heights of a patch, if it exists.
 fn corners(land: &Land, column: usize, row: usize) -> Option<[f64; 4]> {
@@ -200,7 +205,7 @@ fn ray_at(land: &Land, kind: u32, k: [f64; 6]) -> Ray {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(3000), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn single_rays_equal_brute_force(land in any_land(), kind in 0u32..9, k in any::<[u32; 6]>()) {
@@ -237,9 +242,15 @@ proptest! {
             caster.any_hits(&rays, &mut any);
             prop_assert!(any.iter().zip(&distances).all(|(any, t)| *any == t.is_finite()));
         }
+        let (best, portable) = (land.caster(anchor), land.caster(anchor).with_simd(Simd::Portable));
         for (ray, distance) in rays.iter().zip(distances) {
+            let single = best.first_hit(ray);
+            prop_assert_eq!(portable.first_hit(ray).to_bits(), single.to_bits(), "portable single rays differ");
+            prop_assert_eq!(best.any_hit(ray), single.is_finite());
             let exact = Ray { origin: anchor + ray.origin.as_dvec3(), direction: ray.direction.as_dvec3(), reach: f64::from(ray.reach) };
-            check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
+            for distance in [distance, single] {
+                check(&land, &exact, distance.is_finite().then_some(f64::from(distance)), 2e-6)?;
+            }
         }
     }
 
@@ -282,7 +293,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(300), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn views_equal_brute_force(land in any_land(), k in any::<[u32; 6]>(), size in (1u32..90, 1u32..150), field in 0.01f32..2.5) {
@@ -306,7 +317,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(500), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn bulk_heights_and_sights_equal_single_ones(land in any_land(), k in prop::collection::vec(any::<[u32; 6]>(), 1..150)) {
@@ -328,6 +339,121 @@ proptest! {
             caster.par_any_hits(&locals, &mut hits);
             prop_assert!(visible.iter().zip(&hits).all(|(visible, hit)| visible != hit));
         }
+    }
+}
+
+/// Rays with a width: never later than exact ones, and where earlier, at the top of a node that is not wider than they are.
+#[test]
+fn rays_by_footprint_stop_at_nodes_as_wide_as_they_are() {
+    let noise = littoral::field::noise::Fbm::new(60.0, 20.0, 6, 11);
+    let place = |i: usize| DVec2::new((i % 300) as f64, (i / 300) as f64);
+    let heights: Vec<f32> = (0..300 * 200).map(|i| noise.at(place(i)).value as f32).collect();
+    for voids in [false, true] {
+        let mut heights = heights.clone();
+        if voids {
+            heights.iter_mut().step_by(1013).for_each(|height| *height = f32::NAN);
+        }
+        let land = Land::at(Raster::new(300, 200, DVec2::ONE, heights).expect("valid"), DVec2::ZERO);
+        let view =
+            View::looking_at(DVec3::new(-30.0, 20.0, 60.0), DVec3::new(150.0, 110.0, 0.0), 0.9, UVec2::new(96, 70));
+        let caster = land.caster(view.eye);
+        let (corner, right, down) = view.frame();
+        let pixels = 3.0;
+        let spread = pixels * right.length();
+        let rays: Vec<LocalRay> = (0..96 * 70)
+            .map(|i| LocalRay {
+                spread,
+                ..LocalRay::new(Vec3::ZERO, corner + right * ((i % 96) as f32 + 0.5) + down * ((i / 96) as f32 + 0.5))
+            })
+            .collect();
+        let [mut exact, mut wide, mut seen] = [(); 3].map(|()| vec![0.0; rays.len()]);
+        let narrow: Vec<LocalRay> = rays.iter().map(|ray| LocalRay { spread: 0.0, ..*ray }).collect();
+        caster.first_hits(&narrow, &mut exact);
+        caster.first_hits(&rays, &mut wide);
+        caster.view_hits_by_footprint(&view, Vec2::splat(0.5), pixels, 0..70, &mut seen);
+        for simd in [Simd::Portable, Simd::Avx2].into_iter().filter(|simd| simd.available()) {
+            let mut again = vec![0.0; rays.len()];
+            land.caster(view.eye).with_simd(simd).first_hits(&rays, &mut again);
+            assert_eq!(again, wide, "{simd:?} differs");
+        }
+        let mut earlier = 0;
+        for (i, ray) in rays.iter().enumerate() {
+            assert_eq!(caster.first_hit(ray).to_bits(), wide[i].to_bits());
+            for got in [wide[i], seen[i]] {
+                assert!(got <= exact[i] * (1.0 + 1e-5), "{got} is later than {} for {ray:?}", exact[i]);
+                if got < exact[i] * (1.0 - 1e-4) {
+                    earlier += 1;
+                    let at = view.eye + (ray.direction * got).as_dvec3();
+                    let on_top = (1..=land.ranges().top()).any(|level| {
+                        let side = f64::from(1u32 << level);
+                        let nodes = [-1e-3, 1e-3].map(|hair| ((at.truncate() + hair) / side).floor().max(DVec2::ZERO));
+                        side <= f64::from(spread * got) * 1.001
+                            && nodes.iter().any(|node| {
+                                let range = land.ranges().node(level, node.x as usize, node.y as usize);
+                                !range.is_empty() && at.z <= f64::from(range.high) + 1e-3
+                            })
+                    });
+                    assert!(on_top, "{got} instead of {} is over every node of {ray:?}", exact[i]);
+                }
+            }
+        }
+        assert!(earlier > 1000, "only {earlier} rays stopped early");
+    }
+}
+
+/// Maps of many blocks, and of more than one of the coarsest, where brute force takes too long: held against the walk
+/// that is held against brute force. From above, low and high, to all sides, through the whole map.
+#[test]
+fn single_rays_equal_the_exact_walk_on_large_maps() {
+    for (seed, columns, rows, spacing) in
+        [(1, 33, 257, 1.0), (2, 258, 71, 30.0), (3, 700, 650, 7.3), (4, 5000, 90, 2.0), (5, 5, 4500, 1.0)]
+    {
+        let mut state = u64::from(seed);
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let noise = littoral::field::noise::Fbm::new(180.0 * spacing, 25.0 * spacing, 7, seed);
+        let place = |i: usize| DVec2::new((i % columns) as f64, (i / columns) as f64) * spacing;
+        let heights = (0..columns * rows).map(|i| noise.at(place(i)).value as f32).collect();
+        let land =
+            Land::at(Raster::new(columns, rows, DVec2::splat(spacing), heights).expect("valid"), DVec2::new(9e5, -7e4));
+        let (mut hits, mut left) = (0, 0);
+        for _ in 0..if cfg!(miri) { 4 } else { 4000 } {
+            let mut xy = || {
+                land.origin()
+                    + land.extent() * DVec2::new(random(), random()).clamp(DVec2::splat(0.001), DVec2::splat(0.999))
+            };
+            let (from, to) = (xy(), xy());
+            let ground = |xy: DVec2| f64::from(land.height_at(xy).expect("on the map"));
+            let (from, to) = (
+                from.extend(ground(from) + spacing * 60.0 * random() * random()),
+                to.extend(ground(to) + spacing * 20.0 * (random() - 0.5)),
+            );
+            let caster = land.caster(from);
+            let ray = LocalRay::new(Vec3::ZERO, (to - from).as_vec3());
+            let got = caster.first_hit(&ray);
+            assert_eq!(caster.clone().with_simd(Simd::Portable).first_hit(&ray).to_bits(), got.to_bits());
+            let exact = Ray::new(from, ray.direction.as_dvec3());
+            let want = land.first_hit(&exact).map_or(f64::INFINITY, |hit| hit.distance);
+            let length = exact.direction.length();
+            hits += usize::from(got.is_finite());
+            // Rays that graze may pass by a hair: then the surface is that near.
+            let near = |t: f64| {
+                let point = exact.at(t);
+                land.height_at(point.truncate()).is_some_and(|h| {
+                    (point.z - f64::from(h)).abs() < 1e-5 * spacing * (1.0 + t * length / spacing * 0.1)
+                })
+            };
+            let got = f64::from(got);
+            let same = got == want || ((got - want) * length).abs() < 2e-4 * spacing + 2e-6 * want * length;
+            if !same {
+                left += 1;
+                assert!(near(got.min(want)), "{got} instead of {want} for {exact:?} on {columns} × {rows}");
+            }
+        }
+        assert!(cfg!(miri) || hits > 1000, "only {hits} hits on {columns} × {rows}");
+        assert!(left < 20, "{left} rays graze on {columns} × {rows}");
     }
 }
 

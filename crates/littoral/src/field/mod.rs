@@ -3,6 +3,7 @@
 //! Everything downstream — meshes, rays, pictures — asks a height field two things about a square of surface: how low and
 //! high it reaches, and how wrong a coarse drawing of it would be.
 
+mod blocks;
 pub mod coast;
 mod deviation;
 mod land;
@@ -10,6 +11,7 @@ pub mod noise;
 mod pyramid;
 mod raster;
 
+pub(crate) use blocks::{BLOCK_LEVELS, Block, Blocks};
 pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;

@@ -29,7 +29,7 @@ const PIXEL_X: [i32; 16] = [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3];
 const PIXEL_Y: [i32; 16] = [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3];
 
 /// The rays of some rows of a picture, tile by tile.
-pub(super) struct ViewRays<'a> {
+pub(super) struct ViewRays<'a, const FOOTPRINT: bool> {
     pub eye: Vec3,
     /// Direction through pixel coordinate (0, 0), and the steps to the next pixel rightward and downward.
     pub corner: Vec3,
@@ -41,8 +41,8 @@ pub(super) struct ViewRays<'a> {
     pub rows: Range<u32>,
     pub distances: &'a mut [f32],
     pub below: &'a mut Vec<i32>,
-    /// Switched off, every ray starts at the eye.
-    pub beams: bool,
+    /// How wide rays are (pixels), if they are walked by footprint.
+    pub pixels: f32,
     tile: u32,
     /// Next 8 × 8 pixels of the tile.
     group: u32,
@@ -59,18 +59,18 @@ struct Beams {
     z: [f32; 16],
 }
 
-impl<'a> ViewRays<'a> {
+impl<'a, const FOOTPRINT: bool> ViewRays<'a, FOOTPRINT> {
     #[allow(clippy::too_many_arguments, reason = "the numbers of a view, each once")]
     pub fn new(
         eye: Vec3,
         (corner, right, down): (Vec3, Vec3, Vec3),
         sample: Vec2,
+        pixels: f32,
         width: u32,
         rows: Range<u32>,
-        beams: bool,
         distances: &'a mut [f32],
         below: &'a mut Vec<i32>,
-    ) -> ViewRays<'a> {
+    ) -> ViewRays<'a, FOOTPRINT> {
         let (starts, levels) = ([0.0; FINE_IN_TILE], [0; FINE_IN_TILE]);
         ViewRays {
             eye,
@@ -82,7 +82,7 @@ impl<'a> ViewRays<'a> {
             rows,
             distances,
             below,
-            beams,
+            pixels,
             tile: 0,
             group: 0,
             starts,
@@ -109,11 +109,6 @@ impl<'a> ViewRays<'a> {
     /// Finds out where the fine beams of the tile at (x, y) may first meet something.
     #[inline(always)]
     fn survey<L: Lanes>(&mut self, l: L, scene: &Scene, x: u32, y: u32) {
-        if !self.beams {
-            self.starts = [0.0; FINE_IN_TILE];
-            self.levels = [scene.top; FINE_IN_TILE];
-            return;
-        }
         let zeros = [[0.0; 16]; 2];
         let mut coarse = Beams { t: [0.0; 16], level: [scene.top - 1; 16], x: zeros, y: zeros, z: [0.0; 16] };
         for beam in 0..16 {
@@ -250,9 +245,10 @@ fn node<L: Lanes>(l: L, scene: &Scene, axis: usize, cell: L::I, level: L::I) -> 
     l.shr(l.imax(l.imin(cell, l.int(scene.cells[axis] - 1)), l.int(0)), level)
 }
 
-impl Rays for ViewRays<'_> {
+impl<const FOOTPRINT: bool> Rays for ViewRays<'_, FOOTPRINT> {
     const REFILL: u32 = 16;
     const RISE: i32 = 3;
+    const FOOTPRINT: bool = FOOTPRINT;
 
     #[inline(always)]
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
@@ -296,6 +292,10 @@ impl Rays for ViewRays<'_> {
                     let (from, level) = (l.splat(self.starts[fine]), l.int(self.levels[fine]));
                     let at = block.count + part;
                     block.set(l, scene, at, id, origin, direction, l.splat(f32::INFINITY), from, level);
+                    if FOOTPRINT {
+                        let spread = self.pixels * self.right.length() * scene.per_metre.min_element();
+                        l.store(l.splat(spread), &mut block.spread[at..]);
+                    }
                 }
                 block.count += 16;
             }

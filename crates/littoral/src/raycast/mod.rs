@@ -13,6 +13,7 @@ mod scene;
 mod section;
 mod segments;
 mod sight;
+mod single;
 mod slope;
 mod stream;
 mod viewshed;

@@ -25,7 +25,9 @@ pub struct LocalRay {
     pub reach: f32,
     /// Where it goes; its length should lie between 10⁻⁶ and 10⁶ m.
     pub direction: Vec3,
-    /// Room for the ray's width; not looked at yet.
+    /// Its width at a distance of one length of `direction` (m), 0 for exact answers. Where the ray is as wide as a node of the
+    /// range pyramid, the node's highest point answers for all of it: the method of the maximum mipmaps, for rays that stand
+    /// for pixels.
     pub spread: f32,
 }
 
@@ -66,6 +68,8 @@ pub(super) struct Prepared {
     pub cell: [[i32; ROOM]; 2],
     /// Level to begin with; −1 for rays that meet nothing.
     pub level: [i32; ROOM],
+    /// Width at distance 1 (samples); looked at by walks by footprint only.
+    pub spread: [f32; ROOM],
 }
 
 impl Prepared {
@@ -85,6 +89,7 @@ impl Prepared {
             last: [[0; ROOM]; 2],
             cell: [[0; ROOM]; 2],
             level: [0; ROOM],
+            spread: [0.0; ROOM],
         }
     }
 
@@ -193,6 +198,8 @@ pub(super) trait Rays {
     /// line that ends a coarser node, 3 for every other one, better for rays that start near what they hit. All walks of
     /// one kind of rays must share it, since a ray that just touches the rim of a hole may be answered either way.
     const RISE: i32;
+    /// Whether rays stop at nodes that they are as wide as.
+    const FOOTPRINT: bool;
 
     /// Overwrites `block` with the next rays; `count` = 0 when there are none left.
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared);
@@ -234,6 +241,7 @@ struct Packet<L: Lanes> {
     cell_y: L::I,
     /// Level of the node looked at next; 0 at a patch, −1 when done.
     level: L::I,
+    spread: L::F,
     result: L::F,
     /// Lanes that hold a ray not yet delivered.
     occupied: u32,
@@ -267,6 +275,7 @@ impl<L: Lanes> Packet<L> {
             cell_x: i,
             cell_y: i,
             level: l.int(-1),
+            spread: f,
             result: f,
             occupied: 0,
         }
@@ -344,13 +353,16 @@ impl<L: Lanes> Packet<L> {
         self.cell_x = l.expand_int(self.cell_x, m, &block.cell[0][at..]);
         self.cell_y = l.expand_int(self.cell_y, m, &block.cell[1][at..]);
         self.level = l.expand_int(self.level, m, &block.level[at..]);
+        if R::FOOTPRINT {
+            self.spread = l.expand(self.spread, m, &block.spread[at..]);
+        }
         self.result = l.select(m, l.splat(f32::INFINITY), self.result);
         true
     }
 
     /// One step of every lane: into, or past, a node or a patch.
     #[inline(always)]
-    fn step<const SHEET: bool, const ANY: bool>(&mut self, l: L, scene: &Scene, rise: i32) {
+    fn step<R: Rays, const SHEET: bool, const ANY: bool>(&mut self, l: L, scene: &Scene) {
         let (zero, one) = (l.int(0), l.int(1));
         let lines_x = Lines { base: self.base_x, origin: self.x, inverse: self.inverse_x };
         let lines_y = Lines { base: self.base_y, origin: self.y, inverse: self.inverse_y };
@@ -364,7 +376,7 @@ impl<L: Lanes> Packet<L> {
 
         // Nodes: left where the ray is clear of them.
         let inner = l.igt(self.level, zero);
-        let mut clear;
+        let (mut clear, mut wide);
         {
             let line = l.imul(l.shr(row, self.level), l.lookup(&scene.strides, self.level));
             let node = l.iadd(l.iadd(line, l.shr(column, self.level)), l.lookup(&scene.offsets, self.level));
@@ -379,6 +391,16 @@ impl<L: Lanes> Packet<L> {
                 let low_steps = unsafe { l.gather_u16(scene.lows, node) };
                 let low = l.add(l.mul(l.float(low_steps), l.splat(scene.step)), l.splat(scene.low_base));
                 clear = l.or(clear, l.or(l.lt(l.max(z0, z1), low), l.igt(low_steps, high_steps)));
+            }
+            wide = l.mask(0);
+            if R::FOOTPRINT {
+                // As wide as the node, and on its way into it: met where it comes down to the top.
+                let side = l.float(l.shl(one, self.level));
+                wide = l.and(l.without(inner, clear), l.le(side, l.mul(self.spread, self.t)));
+                let falls = l.and(l.lt(self.dz, l.splat(0.0)), l.lt(high, z0));
+                let down = l.div(l.sub(high, self.z), l.select(falls, self.dz, l.splat(-1.0)));
+                let met = l.select(falls, l.max(l.min(down, leave), self.t), self.t);
+                self.result = l.select(wide, met, self.result);
             }
         }
         let mut advance = l.and(inner, clear);
@@ -482,9 +504,9 @@ impl<L: Lanes> Packet<L> {
         self.t = l.select(advance, leave, self.t);
 
         // A level up where the line ends the coarser node as well, down into nodes that are in the way.
-        let ends = l.ieq(l.iand(line, l.shl(l.int(rise), self.level)), zero);
+        let ends = l.ieq(l.iand(line, l.shl(l.int(R::RISE), self.level)), zero);
         let up = l.and(l.and(advance, ends), l.igt(l.int(scene.top), self.level));
-        let finished = l.or(hit, l.and(advance, l.le(self.end, leave)));
+        let finished = l.or(l.or(hit, wide), l.and(advance, l.le(self.end, leave)));
         let mut level = l.iselect(up, l.iadd(self.level, one), self.level);
         level = l.iselect(l.without(inner, clear), l.isub(self.level, one), level);
         self.level = l.iselect(finished, l.int(-1), level);
@@ -545,7 +567,7 @@ pub(super) fn run<L: Lanes, R: Rays, const SHEET: bool, const ANY: bool>(l: L, s
         let mut busy = false;
         for packet in &mut packets {
             busy |= packet.turn_over(l, scene, rays, &mut block, &mut cursor);
-            packet.step::<SHEET, ANY>(l, scene, R::RISE);
+            packet.step::<R, SHEET, ANY>(l, scene);
         }
         if !busy {
             break;
