@@ -5,7 +5,7 @@ use crate::render::Subject;
 use crate::talk::{Failure, Talk, progress, seconds as shown_seconds, tidy};
 use glam::{DVec2, UVec2};
 use littoral::flight::{Flight, FlightPath, Level, Look, Pace, Spot};
-use littoral::picture::{Display, Exposure, Settings, Stage};
+use littoral::picture::{Border, Display, Exposure, Settings, Stage, suiting_border};
 use littoral::space::View;
 use littoral_data::path::{Coordinates, SavedPath};
 use littoral_data::write::{self, Film, FilmSettings, FrameFolder};
@@ -60,6 +60,14 @@ enum Sink {
 }
 
 impl Order<'_> {
+    /// What suits the land's border all along the path: a cut where it stays outside.
+    pub fn border(&self, subject: &Subject) -> Result<Border, Failure> {
+        let (land, water) = (&subject.land, subject.water.as_ref());
+        let points = self.flight_path(subject)?.points;
+        let outside = points.iter().all(|p| suiting_border(land, water, p.spot.xy.extend(0.0)) == Border::Cut);
+        Ok(if outside { Border::Cut } else { Border::Mist })
+    }
+
     /// Draws and writes the film.
     pub fn run(
         &self,

@@ -7,7 +7,9 @@ use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::{Land, coast};
-use littoral::picture::{self, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water};
+use littoral::picture::{
+    self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water,
+};
 use littoral::space::{Ray, View};
 use littoral_data::write::{self, Layer, PngPixels};
 use serde::Serialize;
@@ -61,7 +63,8 @@ pub struct Render {
     /// Coordinates are longitude and latitude in degrees
     #[arg(long, help_heading = "View")]
     lonlat: bool,
-    /// Angle between the picture's lower and upper edge in degrees [default: 45, or what suits a chosen view]
+    /// Angle between the picture's lower and upper edge in degrees [default: 45, or what suits a chosen
+    /// view; 36 for films]
     #[arg(long, value_name = "DEGREES", value_parser = input::field_of_view, help_heading = "View")]
     fov: Option<f64>,
 
@@ -77,7 +80,8 @@ pub struct Render {
     /// Stretch all heights, the eye's too
     #[arg(long, value_name = "FACTOR", value_parser = input::factor, default_value = "1", help_heading = "Look")]
     exaggeration: f64,
-    /// Height of still water in metres, or none. It covers low ground that it can reach from the border of the data
+    /// Height of still water in metres, or none. It covers low ground that it can reach from the border of the data,
+    /// and voids with a rim at that height
     #[arg(long, value_name = "METRES|none", value_parser = input::water, default_value = "0", help_heading = "Look")]
     water: WaterLevel,
     /// How far one sees: 10 in haze, 40 on a clear day, 200 in the clearest air [default: what suits the land]
@@ -194,7 +198,12 @@ impl Render {
         }
 
         let subject = self.subject(talk)?;
-        let (shot, look) = self.shot(&subject, self.files.is_empty(), talk)?;
+        let (mut shot, look) = self.shot(&subject, self.files.is_empty(), talk)?;
+        let film = self.film(&out, &shot);
+        if let Some(film) = &film {
+            shot.shot.border = film.border(&subject)?;
+            shot.shot.air.veils_distance = shot.border == Border::Mist || self.visibility.is_some();
+        }
         let drape = self.texture.as_ref().map(|texture| drape(texture, &subject, talk)).transpose()?;
         let scene = Scene {
             drape: drape.as_ref(),
@@ -204,19 +213,8 @@ impl Render {
         };
         let stage = Stage::new(&scene);
         let settings = Settings { samples: self.samples, seed: self.seed };
-        if self.path.is_some() {
-            let order = film::Order {
-                path: self.path.as_deref().filter(|p| *p != Path::new("orbit")),
-                seconds: self.seconds,
-                fps: self.fps,
-                save: self.save_path.as_deref(),
-                out: &out.file,
-                folder: out.kind == Kind::Frames,
-                look: format!("{:?} {:?} {:?} water {:?}", shot.sun, shot.air, shot.style, self.water),
-                field: shot.field,
-                size: self.size,
-            };
-            return order.run(&subject, &stage, &settings, started, talk);
+        if let Some(film) = film {
+            return film.run(&subject, &stage, &settings, started, talk);
         }
 
         let bar = progress(1000, "rendering");
@@ -257,6 +255,24 @@ impl Render {
             tidy(self.exaggeration, 2),
             subject.datum
         ))
+    }
+
+    /// The film that is wanted, if one is.
+    fn film<'a>(&'a self, out: &'a Output, shot: &Framed) -> Option<film::Order<'a>> {
+        /// Vertical angle of view (rad) of a moderate wide-angle lens: a film moves, whatever lens a still picture has.
+        const LENS: f64 = 0.62;
+        let path = self.path.as_deref()?;
+        Some(film::Order {
+            path: Some(path).filter(|p| *p != Path::new("orbit")),
+            seconds: self.seconds,
+            fps: self.fps,
+            save: self.save_path.as_deref(),
+            out: &out.file,
+            folder: out.kind == Kind::Frames,
+            look: format!("{:?} {:?} {:?} water {:?}", shot.sun, shot.air, shot.style, self.water),
+            field: self.fov.map_or(LENS, f64::to_radians),
+            size: self.size,
+        })
     }
 
     /// Sorts out what a parser cannot: `--path dem.tif` without another file means the file, and an orbit.
@@ -363,13 +379,23 @@ impl Render {
             false if self.style == Some(StyleName::Relief) => picture::overhead(land, water, self.size),
             false => picture::compose(land, water, self.size),
         };
+        let (range, narrow) = (land.height_range(), land.extent().min_element());
+        let relief = f64::from(range.high - range.low);
+        if !range.is_empty() && relief > 1.2 * narrow && self.exaggeration == 1.0 {
+            let factor = tidy((0.3 * narrow / relief).max(0.01), 2);
+            let (name, relief, narrow) = (&subject.name, tidy(relief, 0), tidy(narrow, 0));
+            talk.warn(format!(
+                "{name}: {relief} m of relief on {narrow} m of land: does the file say how far apart its samples are? --exaggeration {factor} draws it as hills"
+            ));
+        }
         let own_field = 2.0 * (0.5 * f64::from(self.size.y) / f64::from(chosen.view.pixels_per_radian)).atan();
         let field = self.fov.map_or(if self.eye.is_some() { 45f64.to_radians() } else { own_field }, f64::to_radians);
-        let Shot { mut view, mut sun, mut air, mut style } = chosen;
+        let Shot { mut view, mut sun, mut air, mut style, mut border } = chosen;
         let look = match self.eye {
             Some(eye) => {
                 let (eye, look) = (self.eye_position(subject, eye, talk)?, self.target(subject)?);
                 view = View::looking_at(eye, look, field as f32, self.size);
+                border = picture::suiting_border(land, water, eye);
                 look
             }
             None => {
@@ -398,7 +424,7 @@ impl Render {
                 StyleName::Image => picture::Style::Image,
             };
         }
-        Ok((Framed { shot: Shot { view, sun, air, style }, field }, look))
+        Ok((Framed { shot: Shot { view, sun, air, style, border }, field }, look))
     }
 
     fn eye_position(&self, subject: &Subject, eye: DVec3, talk: &mut Talk) -> Result<DVec3, Failure> {

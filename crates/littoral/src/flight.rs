@@ -224,13 +224,14 @@ impl FlightPath {
     }
 
     /// The default orbit round a land whose south-western sample lies at `origin` and that covers `extent` (both m):
-    /// round its middle, near enough to see relief and high enough to see all of it.
+    /// round its middle, far enough and high enough to have all of it in a frame of 16:9 and a height of 36°.
     pub fn around(origin: DVec2, extent: DVec2, heights: HeightRange, seconds: f64) -> FlightPath {
         let (low, high) =
             if heights.is_empty() { (0.0, 0.0) } else { (f64::from(heights.low), f64::from(heights.high)) };
         let radius = 0.5 * extent.length();
-        let centre = (origin + 0.5 * extent).extend(low + 0.4 * (high - low));
-        FlightPath::orbit(centre, radius, (high - centre.z) + 0.32 * radius, seconds)
+        // The near half fills more of the frame than the far one: the middle of the frame is below that of the land.
+        let centre = (origin + 0.5 * extent).extend(low + 0.4 * (high - low) - 0.22 * radius);
+        FlightPath::orbit(centre, 1.85 * radius, 0.4 * (high - low) + 1.15 * radius, seconds)
     }
 
     /// Resolves the path over a ground.

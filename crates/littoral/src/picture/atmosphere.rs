@@ -38,12 +38,15 @@ pub struct Atmosphere {
     sun_sine: f32,
     transmittance: Vec<Spectrum>,
     many: Vec<Spectrum>,
+    /// Sunlight on a facing surface, by height.
+    sunlight: Vec<Vec3>,
 }
 
 const T_HEIGHTS: usize = 48;
 const T_ANGLES: usize = 192;
 const M_HEIGHTS: usize = 24;
 const M_ANGLES: usize = 32;
+const S_HEIGHTS: usize = 256;
 
 impl Atmosphere {
     /// Air of some visibility under a sun of some elevation.
@@ -67,6 +70,7 @@ impl Atmosphere {
             sun_sine: sun.elevation.sin() as f32,
             transmittance: Vec::new(),
             many: Vec::new(),
+            sunlight: Vec::new(),
         };
         atmosphere.transmittance = (0..T_HEIGHTS * T_ANGLES)
             .into_par_iter()
@@ -82,6 +86,12 @@ impl Atmosphere {
                 let sine = 2.0 * x / (M_ANGLES - 1) as f32 - 1.0;
                 let height = (y / (M_HEIGHTS - 1) as f32).powi(2) * (TOP - 1.0);
                 atmosphere.series(EARTH + height, sine)
+            })
+            .collect();
+        atmosphere.sunlight = (0..S_HEIGHTS)
+            .map(|i| {
+                let height = (i as f32 / (S_HEIGHTS - 1) as f32).powi(2) * TOP;
+                (SUNLIGHT * atmosphere.to_sun(height, atmosphere.sun_sine)).rgb().max(Vec3::ZERO)
             })
             .collect();
         atmosphere
@@ -111,7 +121,7 @@ impl Atmosphere {
             depth += (last.1 + here) * (0.5 * (t - last.0));
             last = (t, here);
         }
-        depth.map(|d| (-d).exp())
+        depth.through()
     }
 
     /// Share of sunlight that reaches height (m), where the sun's centre has elevation of this sine: 0 when the Earth is
@@ -157,7 +167,7 @@ impl Atmosphere {
                 let densities = self.densities(height);
                 let extinction = self.extinction(densities);
                 let scattering = self.rayleigh * densities.0 + self.mie * (MIE_ALBEDO * densities.1);
-                let survives = extinction.map(|e| (-e * (t1 - t0)).exp());
+                let survives = (extinction * (t1 - t0)).through();
                 let weight = through * slab(extinction, survives, t1 - t0);
                 second += weight * scattering * self.to_sun(height, up.dot(sun)) * (1.0 / (4.0 * PI));
                 kept += weight * scattering;
@@ -179,7 +189,9 @@ impl Atmosphere {
 
     /// Sunlight on a surface facing the sun at a height (m): linear Rec. 709 (klx).
     pub fn sunlight(&self, height: f32) -> Vec3 {
-        (SUNLIGHT * self.to_sun(height, self.sun_sine)).rgb().max(Vec3::ZERO)
+        let at = (height.clamp(0.0, TOP) / TOP).sqrt() * (S_HEIGHTS - 1) as f32;
+        let i = (at as usize).min(S_HEIGHTS - 2);
+        self.sunlight[i].lerp(self.sunlight[i + 1], at - i as f32)
     }
 }
 
@@ -378,7 +390,7 @@ fn march(air: &Atmosphere, r: f32, direction: Vec3, sun: Vec3, white: Vec3) -> V
                 let up = (Vec3::Z * r + direction * t).normalize();
                 let densities = air.densities(height);
                 let extinction = air.extinction(densities);
-                let survives = extinction.map(|e| (-e * step).exp());
+                let survives = (extinction * step).through();
                 let weight = through * slab(extinction, survives, step);
                 let sine = up.dot(sun);
                 let lit = weight * air.to_sun(height, sine);

@@ -13,6 +13,7 @@ use super::ground::Ground;
 use super::texture::decode_srgb;
 use crate::field::HeightRange;
 use glam::{DVec2, Vec2, Vec3};
+use std::sync::LazyLock;
 
 /// Stops of colour: position in [0, 1], hue (degrees), saturation, lightness.
 type Stops = [(f32, f32, f32, f32)];
@@ -67,17 +68,34 @@ impl Tints {
         Tints { low: range.low, high: range.high, level, slope }
     }
 
+    /// By how much slopes are steepened for the light on them, at least 1: on wide or flat land true slopes would show nothing.
+    /// Only the shades follow, as on any relief map; heights, and all that is measured, stay as they are.
+    pub fn steepening(&self) -> f32 {
+        (0.32 / self.slope).max(1.0)
+    }
+
     /// Albedo (linear) of ground at a height (m); `wet` says whether water lies over it where it is below the level.
     pub fn colour(&self, height: f32, wet: bool) -> Vec3 {
-        if wet && height < self.level {
+        if wet && height <= self.level {
             // The shelf is a small part of the depth and most of what one looks at.
             let t = ((self.level - height) / (self.level - self.low).max(1e-3)).clamp(0.0, 1.0);
-            return run_through(BED, t.powf(0.6));
+            return look_up(&BED_RUN, t.powf(0.6));
         }
         let foot = self.level.max(self.low);
         let t = ((height - foot) / (self.high - foot).max(1e-3)).clamp(0.0, 1.0);
-        run_through(LAND, t.powf(0.75))
+        look_up(&LAND_RUN, t.powf(0.75))
     }
+}
+
+/// A run of colours in steps so small that a straight line between them is as good.
+type Run = [Vec3; 1025];
+static LAND_RUN: LazyLock<Run> = LazyLock::new(|| std::array::from_fn(|i| run_through(LAND, i as f32 / 1024.0)));
+static BED_RUN: LazyLock<Run> = LazyLock::new(|| std::array::from_fn(|i| run_through(BED, i as f32 / 1024.0)));
+
+fn look_up(run: &Run, t: f32) -> Vec3 {
+    let at = t.clamp(0.0, 1.0) * 1024.0;
+    let i = (at as usize).min(1023);
+    run[i].lerp(run[i + 1], at - i as f32)
 }
 
 /// The linear colour at `t` along stops.
@@ -136,7 +154,7 @@ pub fn relief(ground: &Ground, tints: &Tints, at: DVec2, height: f32, footprint:
     let tone = ((shade - 0.64) / 0.36).clamp(-1.8, 1.0) * contrast;
     let paper = match below {
         true => hsl(204.0, 0.42, 0.70 + 0.16 * elevation),
-        false => hsl(86.0, 0.17, 0.76).lerp(hsl(42.0, 0.46, 0.87), elevation.powf(0.7)),
+        false => hsl(86.0, 0.20, 0.69).lerp(hsl(42.0, 0.46, 0.82), elevation.powf(0.7)),
     };
     if tone > 0.0 {
         paper.lerp(hsl(50.0, 0.85, 0.95), tone.min(1.0) * 0.75)

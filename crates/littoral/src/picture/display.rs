@@ -13,6 +13,9 @@ pub struct Picture {
     pub eye: DVec3,
     /// What `radiance` is a picture of, and so how it wants to be shown.
     pub medium: Medium,
+    /// Radiance of a white sheet lying level in the light (kcd/m²), if that is to be shown as white: as in a studio. In a landscape
+    /// evening light stays warm: [1, 1, 1].
+    pub white: [f32; 3],
     /// Radiance as linear Rec. 709 red, green, blue, in kilocandela per square metre.
     pub radiance: Vec<[f32; 3]>,
     /// Distance from the eye along the ray (m); infinite where there is sky.
@@ -33,7 +36,7 @@ pub enum Medium {
     /// Light of a landscape: exposed, and shown with the contrast and colour of film.
     #[default]
     Photograph,
-    /// Light on a model whose colours mean something: exposed, its colours kept.
+    /// Light on a model whose colours mean something: shown as their shares of a white sheet's, but for the brightest.
     Model,
     /// The reflectance of paper, shown as it is.
     Paper,
@@ -72,6 +75,7 @@ impl Picture {
             size,
             eye,
             medium: Medium::Photograph,
+            white: [1.0; 3],
             radiance: vec![[0.0; 3]; pixels],
             depth: vec![f32::INFINITY; pixels],
             normal: vec![[0.0; 3]; pixels],
@@ -81,9 +85,13 @@ impl Picture {
         }
     }
 
-    /// The radiance that an automatic exposure shows as middle grey (kcd/m²): the logarithmic mean of what is neither among the
+    /// The radiance that an automatic exposure shows as middle grey (kcd/m²). For a model that of a card that throws back 0.18;
+    /// for a photograph the logarithmic mean of what is neither among the
     /// darkest tenth of the picture nor among the brightest, so that neither the sun's glitter nor a black corner decides.
     pub fn grey(&self) -> f32 {
+        if self.medium == Medium::Model {
+            return 0.18 * luminance(self.white);
+        }
         let mut logs: Vec<f32> = self.radiance.iter().map(|p| luminance(*p).max(1e-9).ln()).collect();
         if logs.is_empty() {
             return 1.0;
@@ -105,17 +113,29 @@ impl Picture {
             Exposure::Automatic => self.grey(),
             Exposure::Grey(grey) => grey,
         };
-        let (contrast, colour) = if self.medium == Medium::Model { (1.15, 1.0) } else { (1.35, 1.28) };
-        let scale = 0.30 / grey.max(1e-9) * how.compensation.exp2();
+        let model = self.medium == Medium::Model;
+        let scale = if model { 0.18 } else { 0.30 } / grey.max(1e-9) * how.compensation.exp2();
+        // A white sheet is shown white, whatever the colour of the light.
+        let balance = luminance(self.white) / Vec3::from(self.white).max(Vec3::splat(1e-9));
         self.radiance
             .par_iter()
             .map(|p| {
-                let shown = film(Vec3::from(*p) * scale, contrast, colour);
+                let light = Vec3::from(*p) * scale;
+                let shown = if model { print(light * balance) } else { film(light * balance, 1.35, 1.28) };
                 // What lies between two steps of the screen is rounded; skies are graded finely enough by sampling noise.
                 shown.to_array().map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
             })
             .collect()
     }
+}
+
+/// Print: reflectance to display values in [0, 1] (encoded for the screen), true to colour but for what is nearly white and brighter.
+fn print(light: Vec3) -> Vec3 {
+    const SHOULDER: f32 = 0.75;
+    light.map(|v| {
+        let over = (v - SHOULDER).max(0.0) / (1.0 - SHOULDER);
+        encode_srgb(v.clamp(0.0, SHOULDER) + (1.0 - SHOULDER) * (1.0 - (-over).exp()))
+    })
 }
 
 /// Film: linear light to display values in [0, 1] (already encoded for the screen). T. Sobotka's AgX, in B. Wrensch's polynomial form

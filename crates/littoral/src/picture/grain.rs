@@ -15,17 +15,15 @@ pub struct Grain {
     pub gradient: Vec3,
 }
 
-/// Gradient noise of unit wavelength.
-#[inline]
-pub fn grain(at: DVec3, seed: u32) -> Grain {
+/// The corners of the lattice cell about a place: where in the cell it is, the gradients, and what each says there.
+#[inline(always)]
+fn corners(at: DVec3, seed: u32) -> (Vec3, [Vec3; 8], [f32; 8]) {
     let floor = |v: f64| {
         let i = v as i64;
         i - i64::from((i as f64) > v)
     };
     let (i, j, k) = (floor(at.x), floor(at.y), floor(at.z));
     let f = Vec3::new((at.x - i as f64) as f32, (at.y - j as f64) as f32, (at.z - k as f64) as f32);
-    let u = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
-    let du = 30.0 * f * f * (f * (f - 2.0) + 1.0);
     let (i, j, k) = (i as u32, j as u32, k as u32);
     let mut g = [Vec3::ZERO; 8];
     let mut d = [0.0f32; 8];
@@ -35,7 +33,33 @@ pub fn grain(at: DVec3, seed: u32) -> Grain {
         g[c as usize] = GRADIENTS[(h >> 28) as usize];
         d[c as usize] = g[c as usize].dot(f - Vec3::new(x as f32, y as f32, z as f32));
     }
-    let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+    (f, g, d)
+}
+
+/// The blend between corners: 0 to 1 with no slope and no curvature at either end.
+#[inline(always)]
+fn fade(f: Vec3) -> Vec3 {
+    f * f * f * (f * (f * 6.0 - 15.0) + 10.0)
+}
+
+#[inline(always)]
+fn mix(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
+}
+
+/// The value of [`grain`], to the bit, at half the cost.
+fn value(at: DVec3, seed: u32) -> f32 {
+    let (f, _, d) = corners(at, seed);
+    let u = fade(f);
+    let x = [mix(d[0], d[1], u.x), mix(d[2], d[3], u.x), mix(d[4], d[5], u.x), mix(d[6], d[7], u.x)];
+    mix(mix(x[0], x[1], u.y), mix(x[2], x[3], u.y), u.z)
+}
+
+/// Gradient noise of unit wavelength.
+pub fn grain(at: DVec3, seed: u32) -> Grain {
+    let (f, g, d) = corners(at, seed);
+    let u = fade(f);
+    let du = 30.0 * f * f * (f * (f - 2.0) + 1.0);
     let mix3 = |a: Vec3, b: Vec3, t: f32| a + (b - a) * t;
     let x = [mix(d[0], d[1], u.x), mix(d[2], d[3], u.x), mix(d[4], d[5], u.x), mix(d[6], d[7], u.x)];
     let y = [mix(x[0], x[1], u.y), mix(x[2], x[3], u.y)];
@@ -52,7 +76,7 @@ pub fn grain(at: DVec3, seed: u32) -> Grain {
 /// The value of noise of a wavelength (m), fading out where it is finer than `footprint` (m).
 pub fn patch(at: DVec3, wavelength: f32, footprint: f32, seed: u32) -> f32 {
     let share = resolved(wavelength, footprint);
-    if share == 0.0 { 0.0 } else { grain(at / f64::from(wavelength), seed).value * share }
+    if share == 0.0 { 0.0 } else { value(at / f64::from(wavelength), seed) * share }
 }
 
 /// How much of a wave of this length a pixel of this footprint can show, in [0, 1].
@@ -113,6 +137,7 @@ mod tests {
             let difference = |by: DVec3| (grain(at + by, 3).value - grain(at - by, 3).value) / 2e-2;
             let expected =
                 Vec3::new(difference(DVec3::X * 1e-2), difference(DVec3::Y * 1e-2), difference(DVec3::Z * 1e-2));
+            assert_eq!(value(at, 3), here.value);
             assert!((here.gradient - expected).length() < 0.02, "{} for {expected}", here.gradient);
             most = most.max(here.value.abs());
             squares += here.value * here.value;

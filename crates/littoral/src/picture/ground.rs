@@ -7,12 +7,13 @@
 //! Missing ground — voids, and what lies beyond an edge of the raster that does not end in water — is replaced by a smooth
 //! membrane spanned between its rims and, outside, a level below the lowest ground. It is never shown as ground: `known`
 //! falls to zero over a few samples before it, and the renderer draws mist there. It exists so that no wall or pit
-//! opens where data ends. The membrane is found by pull and push over a pyramid (S. Gortler et al., "The lumigraph",
+//! opens where data ends. A cut [border](Border) needs none outside. The membrane is found by pull and push over a pyramid (S. Gortler et al., "The lumigraph",
 //! SIGGRAPH 1996), then relaxed.
 
-use super::Water;
+use super::block::Block;
+use super::{Border, Water};
 use crate::field::{Land, Raster};
-use glam::{DVec2, Vec2};
+use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -22,6 +23,12 @@ pub struct Ground<'a> {
     pub land: Cow<'a, Land>,
     /// How far each sample is known, 255 for wholly; empty when all is.
     known: Vec<u8>,
+    /// The block that the land is cut to, if it is.
+    pub block: Option<Block>,
+    /// For a block: which samples were cut away, being void from the raster's edge on; empty for none.
+    cut_away: Vec<bool>,
+    /// Heights for shading where those of `land` drop to the floor; empty if they never do.
+    uncut: Vec<f32>,
     /// Height of the mist that lies beyond the land (m).
     pub mist: f64,
     /// Coarser and coarser means; sample i of a level lies on sample 2i of the finer one. The finest is `land` itself.
@@ -49,7 +56,7 @@ pub struct Surface {
 
 impl<'a> Ground<'a> {
     /// Makes `land` ready.
-    pub fn new(land: &'a Land, water: Option<&Water>) -> Ground<'a> {
+    pub fn new(land: &'a Land, water: Option<&Water>, border: Border) -> Ground<'a> {
         let range = land.height_range();
         let (low, high) = if range.is_empty() { (0.0, 0.0) } else { (f64::from(range.low), f64::from(range.high)) };
         let level = water.map_or(f64::NEG_INFINITY, |w| w.level);
@@ -57,15 +64,72 @@ impl<'a> Ground<'a> {
             Some(water) if water.reaches_horizon() => water.level - 0.02 * (high - low) - 0.5,
             _ => low - 0.05 * (high - low) - 0.002 * land.extent().min_element(),
         };
-        let (land, known) = if needs_mist(land, level) {
-            let (land, known) = with_mist(land, level, mist);
+        let sunk = water.and_then(|w| with_sunk_bed(land, w));
+        let land = sunk.map_or(Cow::Borrowed(land), Cow::Owned);
+        let cut = border == Border::Cut;
+        let block = cut.then(|| Block::of(&land));
+        let (mut cut_away, mut uncut) = (Vec::new(), Vec::new());
+        let (land, known) = if land.raster().voids().any() || !cut && has_dry_border(&land, level) {
+            let (inner_columns, inner_rows) = (land.raster().columns(), land.raster().rows());
+            let margin = if cut { 0 } else { (inner_columns.min(inner_rows) / 14).clamp(3, 160) };
+            if cut {
+                cut_away = voids_from_the_edge(&land);
+            }
+            let (land, known) = with_mist(&land, level, mist, margin, &cut_away);
+            let land = match block.filter(|_| !cut_away.is_empty()) {
+                Some(block) => {
+                    uncut = land.raster().heights().to_vec();
+                    lowered(&land, &cut_away, block.floor as f32)
+                }
+                None => land,
+            };
             (Cow::Owned(land), known)
         } else {
-            (Cow::Borrowed(land), Vec::new())
+            (land, Vec::new())
         };
-        let means = pyramid_of_means(land.raster());
-        let standing = standing(land.raster());
-        Ground { land, known, mist, means, standing }
+        let raster = land.raster();
+        let smooth = if uncut.is_empty() { raster.heights() } else { &uncut };
+        let means = pyramid_of_means(smooth, raster.columns(), raster.rows());
+        let standing = standing(smooth, raster.columns(), raster.rows(), raster.spacing());
+        Ground { land, known, block, cut_away, uncut, mist, means, standing }
+    }
+
+    /// Whether the sample next to a world position (m) is cut away.
+    pub fn is_cut_away(&self, at: DVec2) -> bool {
+        !self.cut_away.is_empty() && {
+            let raster = self.land.raster();
+            let last = DVec2::new((raster.columns() - 1) as f64, (raster.rows() - 1) as f64);
+            let p = ((at - self.land.origin()) / raster.spacing()).round().clamp(DVec2::ZERO, last);
+            self.cut_away[p.y as usize * raster.columns() + p.x as usize]
+        }
+    }
+
+    /// Out of the block where it is cut away beside a world position (m): a level unit vector. The stairs of the samples are
+    /// smoothed, so that the side is lit as one.
+    pub fn outward(&self, at: DVec2) -> Vec3 {
+        const RADIUS: i32 = 4;
+        let spacing = self.land.raster().spacing();
+        let mut sum = DVec2::ZERO;
+        for j in -RADIUS..=RADIUS {
+            for i in -RADIUS..=RADIUS {
+                let offset = DVec2::new(f64::from(i), f64::from(j)) * spacing;
+                if self.is_cut_away(at + offset) {
+                    sum += offset;
+                }
+            }
+        }
+        sum.normalize_or(DVec2::NEG_Y).extend(0.0).as_vec3()
+    }
+
+    /// Whether the surface at a world position (m) is a side of the block: part of it is cut away.
+    pub fn is_side(&self, at: DVec2) -> bool {
+        let raster = self.land.raster();
+        let (columns, rows) = (raster.columns(), raster.rows());
+        !self.cut_away.is_empty()
+            && lattice(at - self.land.origin(), raster.spacing(), columns, rows).is_some_and(|((i, j), _)| {
+                let base = j * columns + i;
+                [base, base + 1, base + columns, base + columns + 1].iter().any(|&k| self.cut_away[k])
+            })
     }
 
     /// Distance between samples (m), the geometric mean of both directions.
@@ -129,10 +193,12 @@ impl<'a> Ground<'a> {
         ((footprint / self.spacing()).max(1.0).log2().round() as usize).min(self.means.len())
     }
 
-    /// The mean height about a world position (m) on a [level](Ground::level_of) of the pyramid: one bilinear read.
-    pub fn mean(&self, at: DVec2, level: usize) -> f32 {
-        let (heights, columns, rows, spacing) = self.level(level);
-        let p = ((at - self.land.origin()) / spacing).as_vec2();
+    /// The mean height about a place on a [level](Ground::level_of) of the pyramid: one bilinear read. The place counts samples of
+    /// the finest level from the origin.
+    #[inline]
+    pub fn mean(&self, place: Vec2, level: usize) -> f32 {
+        let (heights, columns, rows) = self.heights(level);
+        let p = place * (1.0 / (1u64 << level) as f32);
         let p = p.clamp(Vec2::ZERO, Vec2::new((columns - 1) as f32, (rows - 1) as f32));
         let (i, j) = ((p.x as usize).min(columns - 2), (p.y as usize).min(rows - 2));
         let (u, v) = (p.x - i as f32, p.y - j as f32);
@@ -142,44 +208,48 @@ impl<'a> Ground<'a> {
         a + (b - a) * v
     }
 
-    fn level(&self, level: usize) -> (&[f32], usize, usize, DVec2) {
-        let raster = self.land.raster();
+    /// Heights, columns and rows of a level of the pyramid.
+    fn heights(&self, level: usize) -> (&[f32], usize, usize) {
         match level.checked_sub(1) {
-            None => (raster.heights(), raster.columns(), raster.rows(), raster.spacing()),
-            Some(k) => {
-                let means = &self.means[k];
-                (&means.heights, means.columns, means.rows, raster.spacing() * (1u64 << level) as f64)
+            None => {
+                let raster = self.land.raster();
+                let heights = if self.uncut.is_empty() { raster.heights() } else { &self.uncut };
+                (heights, raster.columns(), raster.rows())
             }
+            Some(k) => (&self.means[k].heights, self.means[k].columns, self.means[k].rows),
         }
     }
 
     fn surface_of(&self, at: DVec2, level: usize) -> Surface {
-        let (heights, columns, rows, spacing) = self.level(level);
+        let (heights, columns, rows) = self.heights(level);
+        let spacing = self.land.raster().spacing() * (1u64 << level) as f64;
         let last = DVec2::new((columns - 1) as f64, (rows - 1) as f64);
         let p = ((at - self.land.origin()) / spacing).clamp(DVec2::ZERO, last);
         let (i, j) = ((p.x as usize).min(columns - 2), (p.y as usize).min(rows - 2));
         let (u, v) = ((p.x - i as f64) as f32, (p.y - j as f64) as f32);
-        let mut h = [[0.0f32; 4]; 4];
-        for (dj, row) in h.iter_mut().enumerate() {
-            let base = (j + dj).saturating_sub(1).min(rows - 1) * columns;
-            for (di, cell) in row.iter_mut().enumerate() {
-                *cell = heights[base + (i + di).saturating_sub(1).min(columns - 1)];
-            }
-        }
+        let line = |dj: usize| (j + dj).saturating_sub(1).min(rows - 1) * columns;
+        let (west, east) = (i.saturating_sub(1), (i + 2).min(columns - 1));
+        let row = |dj: usize| {
+            let base = line(dj);
+            [heights[base + west], heights[base + i], heights[base + i + 1], heights[base + east]]
+        };
+        let (h0, h1, h2, h3) = (row(0), row(1), row(2), row(3));
+        // Bilinear between the four samples about the point, of what central differences say at each.
+        let across = |h: [f32; 4]| h[1] + (h[2] - h[1]) * u;
+        let rise = |h: [f32; 4]| (h[2] - h[0]) + ((h[3] - h[1]) - (h[2] - h[0])) * u;
+        let bend = |h: [f32; 4]| {
+            let (a, b) = (h[0] + h[2] - 2.0 * h[1], h[1] + h[3] - 2.0 * h[2]);
+            a + (b - a) * u
+        };
+        let (m0, m1, m2, m3) = (across(h0), across(h1), across(h2), across(h3));
         let (sx, sy) = (1.0 / spacing.x as f32, 1.0 / spacing.y as f32);
-        let mut surface = Surface::default();
-        for (dj, wj) in [(1, 1.0 - v), (2, v)] {
-            for (di, wi) in [(1, 1.0 - u), (2, u)] {
-                let w = wi * wj;
-                let (west, east) = (h[dj][di - 1], h[dj][di + 1]);
-                let (south, north) = (h[dj - 1][di], h[dj + 1][di]);
-                surface.height += w * h[dj][di];
-                surface.slope += w * 0.5 * Vec2::new((east - west) * sx, (north - south) * sy);
-                let curve = (east + west - 2.0 * h[dj][di]) * sx * sx + (north + south - 2.0 * h[dj][di]) * sy * sy;
-                surface.hollow += w * 0.5 * curve;
-            }
+        let mix = |a: f32, b: f32| a + (b - a) * v;
+        let along = mix(m0 + m2 - 2.0 * m1, m1 + m3 - 2.0 * m2);
+        Surface {
+            height: mix(m1, m2),
+            slope: 0.5 * Vec2::new(mix(rise(h1), rise(h2)) * sx, mix(m2 - m0, m3 - m1) * sy),
+            hollow: 0.5 * (mix(bend(h1), bend(h2)) * sx * sx + along * sy * sy),
         }
-        surface
     }
 }
 
@@ -194,11 +264,11 @@ fn lattice(offset: DVec2, spacing: DVec2, columns: usize, rows: usize) -> Option
     Some(((base.x as usize, base.y as usize), (p - base).as_vec2()))
 }
 
-fn pyramid_of_means(raster: &Raster) -> Vec<Means> {
+fn pyramid_of_means(finest: &[f32], columns: usize, rows: usize) -> Vec<Means> {
     let mut means: Vec<Means> = Vec::new();
     loop {
         let (heights, columns, rows) = match means.last() {
-            None => (raster.heights(), raster.columns(), raster.rows()),
+            None => (finest, columns, rows),
             Some(m) => (&m.heights[..], m.columns, m.rows),
         };
         if columns.min(rows) < 4 {
@@ -223,16 +293,15 @@ fn pyramid_of_means(raster: &Raster) -> Vec<Means> {
 
 /// How high trees and houses stand over the ground below them, if the samples are close enough to show them and do: what a disc of
 /// some 40 m cannot reach from below, where much of the surface is too steep for earth.
-fn standing(raster: &Raster) -> Vec<f32> {
+fn standing(heights: &[f32], columns: usize, rows: usize, spacing: DVec2) -> Vec<f32> {
     const CLOSE: f64 = 2.5;
     const RADIUS: f64 = 20.0;
     /// Share of samples with a wall beside them above which a surface is one of trees and houses.
     const STEEP: f64 = 0.04;
-    let (columns, rows, spacing) = (raster.columns(), raster.rows(), raster.spacing().min_element());
-    let heights = raster.heights();
-    if raster.spacing().max_element() > CLOSE {
+    if spacing.max_element() > CLOSE {
         return Vec::new();
     }
+    let spacing = spacing.min_element();
     let wall = (1.5 * spacing) as f32;
     let steep = heights.windows(2).filter(|w| (w[0] - w[1]).abs() > wall).count();
     if (steep as f64) < STEEP * heights.len() as f64 {
@@ -281,21 +350,85 @@ fn extremes(values: &[f32], columns: usize, rows: usize, radius: usize, pick: fn
     result
 }
 
-/// Whether the land has voids or an edge that does not lie under water.
-fn needs_mist(land: &Land, level: f64) -> bool {
+/// Whether the land has an edge that does not lie under water.
+fn has_dry_border(land: &Land, level: f64) -> bool {
     let raster = land.raster();
     let (columns, rows) = (raster.columns(), raster.rows());
     let dry = |c: usize, r: usize| raster.sample(c, r).is_none_or(|h| f64::from(h) > level);
-    raster.voids().any()
-        || (0..columns).any(|c| dry(c, 0) || dry(c, rows - 1))
-        || (0..rows).any(|r| dry(0, r) || dry(columns - 1, r))
+    (0..columns).any(|c| dry(c, 0) || dry(c, rows - 1)) || (0..rows).any(|r| dry(0, r) || dry(columns - 1, r))
 }
 
-/// The land widened by a margin, with a membrane where nothing is known, and how far each sample is known.
-fn with_mist(land: &Land, level: f64, mist: f64) -> (Land, Vec<u8>) {
+/// The land with a bed under water that nobody sounded: where samples are missing, or all lie at the very level of the water
+/// as flattened lakes and seas do. There it sinks gently from the shore, as it does beyond the raster: the water is shown deep, and
+/// no bed through it. `None` where all of the bed was measured.
+fn with_sunk_bed(land: &Land, water: &Water) -> Option<Land> {
+    /// Fall of the bed, and its greatest depth (m).
+    const FALL: f32 = 0.05;
+    const DEEPEST: f32 = 80.0;
+    let raster = land.raster();
+    let (columns, rows, voids) = (raster.columns(), raster.rows(), raster.voids());
+    let level = water.level as f32;
+    let dry: Vec<bool> =
+        (0..columns * rows).map(|i| !(water.floods(i) && (voids.is_void(i) || raster.heights()[i] == level))).collect();
+    let unsounded = dry.iter().filter(|dry| !**dry).count();
+    // A few samples that happen to lie at the level are a shore.
+    if unsounded < (columns * rows) / 500 + 8 {
+        return None;
+    }
+    let fall = FALL * raster.spacing().min_element() as f32;
+    let mut heights: Vec<f32> =
+        (0..columns * rows).map(|i| raster.sample(i % columns, i / columns).unwrap_or(f32::NAN)).collect();
+    for (height, away) in heights.iter_mut().zip(distances(&dry, columns, rows)) {
+        if away > 0.0 {
+            *height = level - (fall * away).min(DEEPEST);
+        }
+    }
+    let sunk = Raster::new(columns, rows, raster.spacing(), heights).ok()?;
+    Some(Land::at(sunk, land.origin()))
+}
+
+/// Which samples are void in one piece with the raster's edge; empty if none.
+fn voids_from_the_edge(land: &Land) -> Vec<bool> {
+    let raster = land.raster();
+    let (columns, rows, voids) = (raster.columns(), raster.rows(), raster.voids());
+    let mut away = vec![false; columns * rows];
+    let ends = (0..columns).flat_map(|c| [c, (rows - 1) * columns + c]);
+    let sides = (0..rows).flat_map(|r| [r * columns, (r + 1) * columns - 1]);
+    let mut queue: Vec<usize> = ends.chain(sides).filter(|&i| voids.is_void(i)).collect();
+    if queue.is_empty() {
+        return Vec::new();
+    }
+    queue.iter().for_each(|&i| away[i] = true);
+    while let Some(i) = queue.pop() {
+        let (column, row) = (i % columns, i / columns);
+        for r in row.saturating_sub(1)..(row + 2).min(rows) {
+            for c in column.saturating_sub(1)..(column + 2).min(columns) {
+                let j = r * columns + c;
+                if voids.is_void(j) && !away[j] {
+                    away[j] = true;
+                    queue.push(j);
+                }
+            }
+        }
+    }
+    away
+}
+
+/// The land with some samples lowered to one height (m).
+fn lowered(land: &Land, which: &[bool], height: f32) -> Land {
+    let raster = land.raster();
+    let heights = raster.heights().iter().zip(which).map(|(h, low)| if *low { height } else { *h }).collect();
+    match Raster::new(raster.columns(), raster.rows(), raster.spacing(), heights) {
+        Ok(raster) => Land::at(raster, land.origin()),
+        Err(error) => unreachable!("a raster with other heights is still a raster: {error}"),
+    }
+}
+
+/// The land widened by a margin (samples; 0 for none), with a membrane where nothing is known, and how far each sample is known.
+/// What is `cut_away` does not count as unknown.
+fn with_mist(land: &Land, level: f64, mist: f64, margin: usize, cut_away: &[bool]) -> (Land, Vec<u8>) {
     let raster = land.raster();
     let (inner_columns, inner_rows) = (raster.columns(), raster.rows());
-    let margin = (inner_columns.min(inner_rows) / 14).clamp(3, 160);
     let (columns, rows) = (inner_columns + 2 * margin, inner_rows + 2 * margin);
     let mut heights = vec![f32::NAN; columns * rows];
     for r in 0..inner_rows {
@@ -309,7 +442,7 @@ fn with_mist(land: &Land, level: f64, mist: f64) -> (Land, Vec<u8>) {
     let mut void: Vec<bool> = heights.iter().map(|h| h.is_nan()).collect();
     for r in 0..rows {
         for c in 0..columns {
-            let ring = r == 0 || c == 0 || r == rows - 1 || c == columns - 1;
+            let ring = margin > 0 && (r == 0 || c == 0 || r == rows - 1 || c == columns - 1);
             if ring {
                 let inside = (c.clamp(margin, columns - 1 - margin), r.clamp(margin, rows - 1 - margin));
                 let edge = heights[inside.1 * columns + inside.0];
@@ -327,7 +460,13 @@ fn with_mist(land: &Land, level: f64, mist: f64) -> (Land, Vec<u8>) {
             }
         }
     }
+    if heights.iter().all(|h| h.is_nan()) {
+        heights.fill(mist as f32);
+    }
     span_membrane(&mut heights, columns, rows);
+    for (void, _) in void.iter_mut().zip(cut_away).filter(|(_, away)| **away) {
+        *void = false;
+    }
     let fringe = (inner_columns.min(inner_rows) as f32 / 48.0).clamp(0.7, 12.0);
     let known = distances(&void, columns, rows)
         .into_iter()
@@ -466,7 +605,7 @@ mod tests {
     fn slopes_of_a_plane_are_exact_at_every_fineness() {
         let land = plane(65, 49, |x, y| 0.3 * x - 0.7 * y - 500.0);
         let sea = Water::flood(&land, 1e4).expect("all under water");
-        let ground = Ground::new(&land, Some(&sea));
+        let ground = Ground::new(&land, Some(&sea), Border::Mist);
         assert!(ground.known.is_empty());
         for footprint in [0.1, 3.0, 7.5, 11.0] {
             let s = ground.surface(DVec2::new(61.3, 70.1), footprint);
@@ -499,10 +638,10 @@ mod tests {
         let columns = 120;
         let heights = (0..columns * columns).map(|i| town((i % columns) as f64, (i / columns) as f64) as f32).collect();
         let raster = Raster::new(columns, columns, DVec2::ONE, heights).expect("valid");
-        let heights = standing(&raster);
+        let heights = standing(raster.heights(), columns, columns, DVec2::ONE);
         assert!((heights[62 * columns + 56] - 7.0).abs() < 1.5 || (heights[57 * columns + 57] - 7.0).abs() < 1.5);
-        let hill = (0..columns * columns).map(|i| (i % columns) as f32 * 0.8).collect();
-        assert!(standing(&Raster::new(columns, columns, DVec2::ONE, hill).expect("valid")).is_empty());
+        let hill: Vec<f32> = (0..columns * columns).map(|i| (i % columns) as f32 * 0.8).collect();
+        assert!(standing(&hill, columns, columns, DVec2::ONE).is_empty());
     }
 
     #[test]
@@ -511,7 +650,7 @@ mod tests {
             let hole = (30.0..44.0).contains(&x) && (40.0..70.0).contains(&y);
             if hole { f64::NAN } else { 100.0 + x }
         });
-        let ground = Ground::new(&land, None);
+        let ground = Ground::new(&land, None, Border::Mist);
         for (x, y) in [(10.0, 60.0), (66.0, 90.0), (76.0, 3.0)] {
             let at = DVec2::new(x, y);
             assert_eq!(ground.land.height_at(at), land.height_at(at));

@@ -10,11 +10,13 @@
 //!
 //! Where nothing is known — outside the raster where it does not end in water, and at void samples — the picture shows
 //! *mist*: a flat neutral tone without relief that cannot be mistaken for ground. Ground dissolves into it over a few
-//! samples; no cliff, plain or interpolated hill is ever invented.
+//! samples; no cliff, plain or interpolated hill is ever invented. Land seen from outside is a *block* instead, cut clean where
+//! the data ends ([`Border`]).
 //!
 //! The same scene, view and settings give the same bits, however many threads work.
 
 mod atmosphere;
+mod block;
 mod cartography;
 mod compose;
 mod display;
@@ -28,9 +30,10 @@ mod skylight;
 mod spectrum;
 mod stage;
 mod texture;
+mod tile;
 mod water;
 
-pub use compose::{Shot, coast_shot, compose, overhead};
+pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
 pub use display::{Display, Exposure, Medium, Picture};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
@@ -53,6 +56,8 @@ pub struct Scene<'a> {
     pub air: Air,
     /// How the ground is coloured.
     pub style: Style,
+    /// What is shown where the land ends.
+    pub border: Border,
     /// The picture laid over the ground; used by [`Style::Image`], which without one is [`Style::Natural`].
     pub drape: Option<&'a Drape>,
     /// What grows and lies where, for [`Style::Natural`].
@@ -71,15 +76,17 @@ impl<'a> Scene<'a> {
             sun: Sun::new(240f64.to_radians(), 25f64.to_radians()),
             air: Air::default(),
             style: Style::Natural,
+            border: Border::Mist,
             drape: None,
             climate: Climate::default(),
             north: 0.0,
         }
     }
 
-    /// The scene in the style, light and air that suit `shot`.
+    /// The scene in the style, light, air and border that suit `shot`.
     pub fn for_shot(land: &'a Land, water: Option<&'a Water>, shot: &Shot) -> Scene<'a> {
-        Scene { sun: shot.sun, air: shot.air, style: shot.style, ..Scene::new(land, water) }
+        let Shot { sun, air, style, border, .. } = *shot;
+        Scene { sun, air, style, border, ..Scene::new(land, water) }
     }
 }
 
@@ -163,10 +170,20 @@ pub enum Style {
     Image,
 }
 
+/// What is shown where the land ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Border {
+    /// Land dissolves into mist, water goes on to the horizon: for eyes within it.
+    #[default]
+    Mist,
+    /// Land and water are cut clean, a block on a level floor: for eyes outside it.
+    Cut,
+}
+
 /// How a picture is sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Rays through each pixel, at least 1.
+    /// Rays through each pixel, at least 1. Where the first few agree the others are spared.
     pub samples: u32,
     /// Which random pattern; pictures of the same seed are the same to the bit.
     pub seed: u32,

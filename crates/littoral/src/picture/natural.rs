@@ -89,7 +89,13 @@ pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climat
 
     // Patches of growth.
     let plain = DVec3::new(at.x, at.y, 0.35 * at.z);
-    let wide = patch(plain, 620.0, footprint, 1) + 0.6 * patch(plain, 260.0, footprint, 2);
+    let mut wide = patch(plain, 620.0, footprint, 1) + 0.6 * patch(plain, 260.0, footprint, 2);
+    // Wide samples are of wide land, seen from so far that only whole valleys and plains differ.
+    let regional = step(12.0, 40.0, spacing);
+    if regional > 0.0 {
+        wide = wide * (1.0 - 0.45 * regional)
+            + regional * (0.75 * patch(plain, 2700.0, footprint, 15) + 0.75 * patch(plain, 9400.0, footprint, 16));
+    }
     let middle = patch(plain, 74.0, footprint, 3) + 0.6 * patch(plain, 31.0, footprint, 4);
     let fine =
         patch(plain, 9.0, footprint, 5) + 0.7 * patch(plain, 3.1, footprint, 6) + 0.5 * patch(plain, 0.9, footprint, 7);
@@ -139,7 +145,8 @@ pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climat
             + 0.6 * patch(beds, 4.1, footprint / tall, 11)
             + 0.35 * patch(beds, 1.3, footprint / tall, 13);
         let joint_at = DVec3::new(at.x, at.y, 0.16 * at.z) / (8.5 * level);
-        let split = resolved(8.5 * tall, footprint) * cliff;
+        // Joints as wide as a valley would look like worms.
+        let split = resolved(8.5 * tall, footprint) * cliff * (1.0 - step(6.0, 16.0, spacing));
         let joints = grain(joint_at, 14);
         let crack = split * step(0.16, 0.0, joints.value.abs());
         let lean = joints.gradient * Vec3::new(0.42, 0.42, 0.07) * split;

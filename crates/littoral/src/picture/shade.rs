@@ -2,14 +2,16 @@
 
 use super::Style;
 use super::atmosphere::Veil;
+use super::block::Wall;
 use super::cartography::relief;
 use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, Site, natural};
-use super::sampler::Sampler;
+use super::sampler::Pattern;
 use super::sea::{Ripples, fresnel, glitter, refract, ripples};
 use super::skylight::irradiance;
-use super::stage::{HIGHEST_EYE, Lens, Stage, purpose};
+use super::stage::{HIGHEST_EYE, Lens, Stage};
+use super::tile::FIRST;
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -30,6 +32,13 @@ pub enum Ahead {
     },
     /// The ground.
     Ground {
+        /// Where (m).
+        position: DVec3,
+    },
+    /// The side of a block.
+    Wall(Wall),
+    /// What a block stands on.
+    Floor {
         /// Where (m).
         position: DVec3,
     },
@@ -60,13 +69,52 @@ pub struct Shaded {
 /// already averaged over the pixel's footprint, while edges, shadows and mirrors keep every sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Near {
-    ground: Option<(f32, u32, Facet)>,
-    water: Option<(f32, u32, Pool)>,
-    veil: Option<(f32, Veil)>,
+    ground: Lent<Facet>,
+    water: Lent<Pool>,
+    veil: Lent<Veil>,
 }
 
-/// Samples that share one look-up.
-const SHARED: u32 = 4;
+/// What was looked up last, at which distance (m), and how many samples have used it.
+#[derive(Clone, Copy, Debug)]
+struct Lent<T>(Option<(f32, u32, T)>);
+
+impl<T> Default for Lent<T> {
+    fn default() -> Lent<T> {
+        Lent(None)
+    }
+}
+
+impl<T: Copy> Lent<T> {
+    /// What was looked up last, if that is within a share of the distance and not yet used `most` times; else `look_up`'s.
+    fn take(&mut self, distance: f32, share: f32, most: u32, look_up: impl FnOnce() -> T) -> T {
+        match &mut self.0 {
+            Some((at, uses, thing)) if *uses < most && (*at - distance).abs() <= share * *at => {
+                *uses += 1;
+                *thing
+            }
+            _ => self.0.insert((distance, 1, look_up())).2,
+        }
+    }
+}
+
+/// One sample's look at something.
+#[derive(Clone, Copy)]
+struct Look<'a> {
+    /// Away from the eye, unit.
+    direction: Vec3,
+    /// What is looked at (m).
+    position: DVec3,
+    /// How far away it is (m).
+    distance: f32,
+    /// The pixel's random numbers, and which of them are the sample's.
+    pattern: Pattern<'a>,
+    index: u32,
+}
+
+/// Samples that share one look-up: two of the first few, so that these can disagree, and four of the others.
+fn shared(index: u32) -> u32 {
+    if index < FIRST { 2 } else { 4 }
+}
 
 /// A piece of ground, lit by the sky.
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +145,7 @@ impl Stage<'_> {
         lens: &Lens,
         direction: Vec3,
         ahead: &Ahead,
-        sampler: Sampler,
+        pattern: Pattern,
         index: u32,
         near: &mut Near,
     ) -> Shaded {
@@ -109,28 +157,30 @@ impl Stage<'_> {
                 let light = lens.sky.radiance(direction) + lens.sky.sun_disc(direction);
                 return Shaded { light, through: Vec3::ONE, sky: true, ..Shaded::default() };
             }
-            Ahead::Mist { position } | Ahead::Water { position } | Ahead::Ground { position } => position,
+            Ahead::Mist { position }
+            | Ahead::Water { position }
+            | Ahead::Ground { position }
+            | Ahead::Floor { position }
+            | Ahead::Wall(Wall { position, .. }) => position,
         };
         let distance = (position - lens.eye).length() as f32;
+        let look = Look { direction, position, distance, pattern, index };
         let mut shaded = match ahead {
-            Ahead::Water { .. } => self.water(lens, direction, position, distance, sampler, index, near),
-            Ahead::Ground { .. } => self.ground(lens, direction, position, distance, sampler, index, near),
+            Ahead::Water { .. } => self.water(lens, &look, near),
+            Ahead::Ground { .. } => self.ground(lens, &look, near),
+            Ahead::Wall(wall) => self.cut(lens, direction, wall, self.to_sun(pattern, index)),
+            Ahead::Floor { .. } => self.floor(lens, position, self.to_sun(pattern, index)),
             _ => Shaded { light: self.mist, ..Shaded::default() },
         };
         shaded.through = Vec3::ONE;
         if self.scene.air.veils_distance {
-            let veil = match near.veil {
-                Some((at, veil)) if close(at, distance, 0.004) => veil,
-                _ => {
-                    let mut through = distance;
-                    if lens.eye.z > HIGHEST_EYE {
-                        through = through.min((HIGHEST_EYE - position.z) as f32 / (-direction.z).max(1e-3));
-                    }
-                    let veil = lens.sky.veil(direction, through);
-                    near.veil = Some((distance, veil));
-                    veil
+            let veil = near.veil.take(distance, 0.004, u32::MAX, || {
+                let mut through = distance;
+                if lens.eye.z > HIGHEST_EYE {
+                    through = through.min((HIGHEST_EYE - position.z) as f32 / (-direction.z).max(1e-3));
                 }
-            };
+                lens.sky.veil(direction, through)
+            });
             (shaded.veil, shaded.through) = (veil.light, veil.through);
         }
         shaded
@@ -148,6 +198,7 @@ impl Stage<'_> {
                 let ground = relief(&self.ground, &self.tints, at, position.z as f32, footprint, to_sun, wet);
                 paper.lerp(ground, self.ground.known(at))
             }
+            Ahead::Wall(wall) => paper * (0.62 + 0.12 * wall.normal.dot(self.sun).max(0.0)),
             _ => paper,
         };
         Shaded { light, through: Vec3::ONE, sky: matches!(ahead, Ahead::Sky), ..Shaded::default() }
@@ -160,46 +211,27 @@ impl Stage<'_> {
     }
 
     /// A direction to a random point of the sun's disc.
-    fn to_sun(&self, sampler: Sampler, index: u32) -> Vec3 {
+    fn to_sun(&self, pattern: Pattern, index: u32) -> Vec3 {
         let across = self.sun.any_orthonormal_vector();
-        let disc = sampler.disc(index, purpose::SUN) * self.scene.sun.angular_radius as f32;
+        let disc = pattern.disc(index) * self.scene.sun.angular_radius as f32;
         (self.sun + across * disc.x + self.sun.cross(across) * disc.y).normalize()
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
-    fn ground(
-        &self,
-        lens: &Lens,
-        direction: Vec3,
-        position: DVec3,
-        distance: f32,
-        sampler: Sampler,
-        index: u32,
-        near: &mut Near,
-    ) -> Shaded {
+    fn ground(&self, lens: &Lens, look: &Look, near: &mut Near) -> Shaded {
+        let Look { direction, position, distance, pattern, index } = *look;
         let known = self.ground.known(position.truncate());
         if known == 0.0 {
             return Shaded { light: self.mist, ..Shaded::default() };
         }
-        // The lines of a map are finer than a footprint: every sample looks for itself.
-        let shared = if self.is_map() { 1 } else { SHARED };
-        let facet = match near.ground {
-            Some((at, uses, facet)) if uses < shared && close(at, distance, 0.02) => {
-                near.ground = Some((at, uses + 1, facet));
-                facet
-            }
-            _ => {
-                let facet = self.facet(lens, direction, position, distance);
-                near.ground = Some((distance, 1, facet));
-                facet
-            }
-        };
+        // The lines of a map are finer than a footprint: where samples disagree every one looks for itself.
+        let shared = if self.is_map() && index >= FIRST { 1 } else { shared(index) };
+        let facet = near.ground.take(distance, 0.02, shared, || self.facet(lens, direction, position, distance));
         let mut shaded = Shaded { light: facet.skylit, ..Shaded::default() };
         if facet.sunlit != Vec3::ZERO {
             let lift = 0.02 * self.ground.spacing() + 1.5e-4 * distance;
             shaded.sunlit = facet.sunlit;
             let origin = (position - lens.eye).as_vec3() + facet.smooth * lift;
-            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
+            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
         }
         if known < 1.0 {
             shaded.light = self.mist.lerp(shaded.light, known);
@@ -211,11 +243,16 @@ impl Stage<'_> {
     /// The ground at a place, as a pixel sees it.
     fn facet(&self, lens: &Lens, direction: Vec3, position: DVec3, distance: f32) -> Facet {
         let at = position.truncate();
-        let rough = self.ground.surface(at, distance * lens.pixel);
-        let normal_of = |s: &Surface| Vec3::new(-s.slope.x, -s.slope.y, 1.0).normalize();
-        let footprint = self.footprint(lens, distance, -direction.dot(normal_of(&rough)));
+        let cosine = match self.is_map() {
+            true => -direction.z,
+            false => {
+                let rough = self.ground.surface(at, distance * lens.pixel);
+                -direction.dot(normal_of_slope(rough.slope))
+            }
+        };
+        let footprint = self.footprint(lens, distance, cosine);
         let surface = self.ground.surface(at, footprint);
-        let smooth = normal_of(&surface);
+        let smooth = normal_of_slope(surface.slope);
         let material = self.material(position, &surface, footprint);
         let sky = irradiance(&self.skylight.at(at), material.normal) * material.openness;
         let mut skylit = material.albedo / PI * sky;
@@ -245,7 +282,9 @@ impl Stage<'_> {
         };
         if self.scene.style == Style::Tint {
             let wet = self.scene.water.is_some_and(|w| w.covers(at));
-            return even(self.tints.colour(position.z as f32, wet));
+            let Material { albedo, openness, .. } = even(self.tints.colour(position.z as f32, wet));
+            let normal = normal_of_slope(surface.slope * self.tints.steepening());
+            return Material { albedo, normal, openness, wet: 0.0 };
         }
         if let (Style::Image, Some(drape)) = (self.scene.style, self.scene.drape) {
             let span = f64::from(footprint);
@@ -262,30 +301,11 @@ impl Stage<'_> {
         natural(&site, surface, &broad, &self.scene.climate)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call, from `shade`; a struct would only rename them")]
-    fn water(
-        &self,
-        lens: &Lens,
-        direction: Vec3,
-        position: DVec3,
-        distance: f32,
-        sampler: Sampler,
-        index: u32,
-        near: &mut Near,
-    ) -> Shaded {
+    fn water(&self, lens: &Lens, look: &Look, near: &mut Near) -> Shaded {
+        let Look { direction, position, distance, pattern, index } = *look;
         let eye = -direction;
-        let pool = match near.water {
-            Some((at, uses, pool)) if uses < SHARED && close(at, distance, 0.02) => {
-                near.water = Some((at, uses + 1, pool));
-                pool
-            }
-            _ => {
-                let pool = self.pool(lens, direction, position, distance);
-                near.water = Some((distance, 1, pool));
-                pool
-            }
-        };
-        let slope = pool.ripples.slope + pool.ripples.variance.sqrt() * sampler.normal(index, purpose::RIPPLE);
+        let pool = near.water.take(distance, 0.02, shared(index), || self.pool(lens, direction, position, distance));
+        let slope = pool.ripples.slope + pool.ripples.variance.sqrt() * pattern.ripple(index);
         let facet = normal_of_slope(slope);
         let facet = if facet.dot(eye) > 0.02 { facet } else { Vec3::Z };
         let share = fresnel(facet.dot(eye));
@@ -305,7 +325,7 @@ impl Stage<'_> {
         if self.sun.z > 0.0 {
             shaded.sunlit =
                 pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &pool.ripples) * film);
-            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(sampler, index)));
+            shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
         }
         if pool.open < 1.0 {
             shaded.light = self.mist.lerp(shaded.light, pool.open);
@@ -404,9 +424,4 @@ impl Stage<'_> {
 
 fn normal_of_slope(slope: Vec2) -> Vec3 {
     Vec3::new(-slope.x, -slope.y, 1.0).normalize()
-}
-
-/// Whether two distances differ by no more than a share of the first.
-fn close(a: f32, b: f32, share: f32) -> bool {
-    (a - b).abs() <= share * a
 }

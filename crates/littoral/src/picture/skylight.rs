@@ -18,7 +18,7 @@ const DIRECTIONS: usize = 16;
 /// Steps of elevation in the tables, from straight down to straight up.
 const STEPS: usize = 96;
 /// Most grid points along a side.
-const MOST: usize = 320;
+const MOST: usize = 256;
 
 /// Light arriving from all sides: nine spherical harmonics of radiance (kcd/m²), ready for [`irradiance`].
 pub type Light = [Vec3; 9];
@@ -150,19 +150,23 @@ impl Steps {
 fn horizon(ground: &Ground, at: DVec2, fineness: f32, sun: Vec3, around: &Steps, towards: &Steps) -> Horizon {
     let surface = ground.surface(at, fineness);
     // The greatest tangent of elevation along a direction, and where.
+    let raster = ground.land.raster();
+    let place = ((at - ground.land.origin()) / raster.spacing()).as_vec2();
+    let per_metre = (1.0 / raster.spacing()).as_vec2();
     let march = |along: Vec2, steps: &Steps| {
-        let (mut tangent, mut place) = (surface.slope.dot(along), ground.spacing());
+        let stride = along * per_metre;
+        let (mut tangent, mut far) = (surface.slope.dot(along), ground.spacing());
         for &(t, level) in &steps.0 {
-            let rise = (ground.mean(at + along.as_dvec2() * f64::from(t), level) - surface.height) / t;
+            let rise = (ground.mean(place + stride * t, level) - surface.height) / t;
             if rise > tangent {
-                (tangent, place) = (rise, t);
+                (tangent, far) = (rise, t);
             }
         }
-        (tangent, place)
+        (tangent, far)
     };
     let ring = std::array::from_fn(|k| {
-        let (tangent, place) = march(direction(k), around);
-        (elevation_step(tangent.atan()), place)
+        let (tangent, far) = march(direction(k), around);
+        (elevation_step(tangent.atan()), far)
     });
     let (tangent, _) = march(sun.truncate().normalize_or(Vec2::X), towards);
     let elevation = sun.z.clamp(-1.0, 1.0).asin();

@@ -39,6 +39,27 @@ impl Spectrum {
         Spectrum(self.0.map(f))
     }
 
+    /// e to the power of minus each number, which has to be at least 0: what a path of that optical depth lets through. To within
+    /// 3·10⁻⁷, all bands at once.
+    #[inline]
+    pub fn through(self) -> Spectrum {
+        self.map(|depth| {
+            // 2^t = 2^whole · 2^part; adding this number rounds to a whole one and leaves it in the lowest bits.
+            const ROUND: f32 = 12_582_912.0;
+            let t = (depth * -std::f32::consts::LOG2_E).max(-126.0);
+            let rounded = t + ROUND;
+            let part = (t - (rounded - ROUND)) * std::f32::consts::LN_2;
+            // Taylor's series of e^part to the sixth power, |part| < 0.35.
+            let series = 1.0
+                + part
+                    * (1.0
+                        + part
+                            * (0.5 + part * (1.0 / 6.0 + part * (1.0 / 24.0 + part * (1.0 / 120.0 + part / 720.0)))));
+            let whole = rounded.to_bits().wrapping_sub(ROUND.to_bits()) << 23;
+            f32::from_bits(series.to_bits().wrapping_add(whole))
+        })
+    }
+
     /// Linear Rec. 709 (kcd/m², or klx) of a spectral radiance (or irradiance) in W m⁻² nm⁻¹. Colours outside the gamut
     /// have negative parts.
     pub fn rgb(self) -> Vec3 {
@@ -109,6 +130,16 @@ impl Mul<f32> for Spectrum {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_passes_is_the_exponential() {
+        for i in 0..4000 {
+            let depth = 1e-4 * (i as f32).powi(2) * 0.05;
+            let (got, expected) = (Spectrum::splat(depth).through().0[3], (-depth).exp());
+            assert!((got - expected).abs() <= 3e-7 + 1e-6 * expected * depth, "{got} for {expected} at {depth}");
+        }
+        assert!(Spectrum::splat(1e9).through().0[0] < 1e-37);
+    }
 
     #[test]
     fn sunlight_has_its_known_illuminance_and_colour() {

@@ -1,9 +1,12 @@
 //! Still water: where it lies.
 //!
-//! Ground below a level is wet only if water can get there: the flood starts at the open border of the land (the raster's
-//! edge and the rims of voids) and spreads over samples that are no higher than the level. Polders, Death Valley and the
-//! Dead Sea stay as they are. The water's edge is the exact contour of the bilinear surface, not the stairs of the mask,
-//! since the mask is widened by one sample and heights decide within it.
+//! Ground below a level is wet only if water can get there: the flood starts at the raster's edge and spreads over samples
+//! that are no higher than the level. Polders, Death Valley and the Dead Sea stay as they are. The water's edge is the exact
+//! contour of the bilinear surface, not the stairs of the mask, since the mask is widened by one sample and heights decide
+//! within it.
+//!
+//! Many files hold no data where there is sea. A void that the flood reaches and whose rim nearly everywhere lies about at the
+//! level is taken for it; all other voids stay unknown.
 
 use crate::field::Land;
 use glam::DVec2;
@@ -17,12 +20,16 @@ pub struct Water {
     rows: usize,
     origin: DVec2,
     spacing: DVec2,
-    /// One a sample, row by row from the south: flooded, or next to a flooded one.
-    near: Vec<bool>,
+    /// One a sample, row by row from the south: [`DRY`], [`BESIDE`] a flooded one, or [`FLOODED`].
+    reach: Vec<u8>,
     flooded: usize,
     /// Whether it goes on beyond each edge: west, east, south, north.
     open: [bool; 4],
 }
+
+const DRY: u8 = 0;
+const BESIDE: u8 = 1;
+const FLOODED: u8 = 2;
 
 impl Water {
     /// The water that reaches `level` (m) from beyond the land's border; `None` where everything there is higher.
@@ -31,8 +38,12 @@ impl Water {
         let (columns, rows) = (raster.columns(), raster.rows());
         let heights = raster.heights();
         let voids = raster.voids();
-        let low = |i: usize| !voids.is_void(i) && f64::from(heights[i]) <= level;
-        let mut wet = vec![false; columns * rows];
+        let sea = if voids.any() { voids_of_the_sea(land, level) } else { Vec::new() };
+        let low = |i: usize| match voids.is_void(i) {
+            true => sea.get(i) == Some(&true),
+            false => f64::from(heights[i]) <= level,
+        };
+        let mut reach = vec![DRY; columns * rows];
         let mut queue: Vec<usize> = Vec::new();
         let mut open = [false; 4];
         for row in 0..rows {
@@ -43,7 +54,7 @@ impl Water {
                     for (open, edge) in open.iter_mut().zip(edges) {
                         *open |= edge;
                     }
-                    wet[i] = true;
+                    reach[i] = FLOODED;
                     queue.push(i);
                 }
             }
@@ -54,8 +65,8 @@ impl Water {
             for r in row.saturating_sub(1)..(row + 2).min(rows) {
                 for c in column.saturating_sub(1)..(column + 2).min(columns) {
                     let j = r * columns + c;
-                    if !wet[j] && low(j) {
-                        wet[j] = true;
+                    if reach[j] != FLOODED && low(j) {
+                        reach[j] = FLOODED;
                         flooded += 1;
                         queue.push(j);
                     }
@@ -65,19 +76,38 @@ impl Water {
         if flooded == 0 {
             return None;
         }
-        let mut near = wet.clone();
-        for i in (0..columns * rows).filter(|&i| wet[i]) {
-            let (column, row) = (i % columns, i / columns);
-            for r in row.saturating_sub(1)..(row + 2).min(rows) {
-                near[r * columns + column.saturating_sub(1)..r * columns + (column + 2).min(columns)].fill(true);
+        for i in 0..columns * rows {
+            if reach[i] == FLOODED {
+                let (column, row) = (i % columns, i / columns);
+                for r in row.saturating_sub(1)..(row + 2).min(rows) {
+                    for beside in
+                        &mut reach[r * columns + column.saturating_sub(1)..r * columns + (column + 2).min(columns)]
+                    {
+                        *beside = (*beside).max(BESIDE);
+                    }
+                }
             }
         }
-        Some(Water { level, columns, rows, origin: land.origin(), spacing: raster.spacing(), near, flooded, open })
+        Some(Water { level, columns, rows, origin: land.origin(), spacing: raster.spacing(), reach, flooded, open })
     }
 
     /// Share of the land's samples that lie under water, in [0, 1].
     pub fn share(&self) -> f64 {
         self.flooded as f64 / (self.columns * self.rows) as f64
+    }
+
+    /// Share of the raster's outline that lies under water, in [0, 1].
+    pub fn share_of_border(&self) -> f64 {
+        let (columns, rows) = (self.columns, self.rows);
+        let ends = (0..columns).flat_map(|c| [c, (rows - 1) * columns + c]);
+        let sides = (0..rows).flat_map(|r| [r * columns, (r + 1) * columns - 1]);
+        let wet = ends.chain(sides).filter(|&i| self.reach[i] == FLOODED).count();
+        wet as f64 / (2 * (columns + rows)) as f64
+    }
+
+    /// Whether a sample of the land, counted row by row from the south, lies under water.
+    pub(super) fn floods(&self, sample: usize) -> bool {
+        self.reach[sample] == FLOODED
     }
 
     /// Whether the water goes on beyond any edge of the raster.
@@ -94,8 +124,50 @@ impl Water {
             return self.reaches_horizon();
         }
         let nearest = lattice.round();
-        self.near[nearest.y as usize * self.columns + nearest.x as usize]
+        self.reach[nearest.y as usize * self.columns + nearest.x as usize] != DRY
     }
+}
+
+/// The samples of voids with a rim that nearly everywhere lies about at the level: sea, if water gets there.
+fn voids_of_the_sea(land: &Land, level: f64) -> Vec<bool> {
+    /// Share of the rim that may be higher: cliffs that drop into the sea.
+    const HIGH: f64 = 0.35;
+    let raster = land.raster();
+    let (columns, rows, heights, voids) = (raster.columns(), raster.rows(), raster.heights(), raster.voids());
+    let range = land.height_range();
+    // About at the level: a beach on a slope of one in ten, and no more than a fiftieth of the relief.
+    let tolerance = (0.1 * raster.spacing().max_element()).max(0.02 * f64::from(range.high - range.low)).max(0.5);
+    let mut sea = vec![false; columns * rows];
+    let mut seen = vec![false; columns * rows];
+    let mut queue = Vec::new();
+    for start in 0..columns * rows {
+        if seen[start] || !voids.is_void(start) {
+            continue;
+        }
+        let (mut part, mut rim, mut high) = (Vec::new(), 0usize, 0usize);
+        seen[start] = true;
+        queue.push(start);
+        while let Some(i) = queue.pop() {
+            part.push(i);
+            let (column, row) = (i % columns, i / columns);
+            for r in row.saturating_sub(1)..(row + 2).min(rows) {
+                for c in column.saturating_sub(1)..(column + 2).min(columns) {
+                    let j = r * columns + c;
+                    if !voids.is_void(j) {
+                        rim += 1;
+                        high += usize::from((f64::from(heights[j]) - level).abs() > tolerance);
+                    } else if !seen[j] {
+                        seen[j] = true;
+                        queue.push(j);
+                    }
+                }
+            }
+        }
+        if rim > 0 && (high as f64) <= HIGH * rim as f64 {
+            part.iter().for_each(|&i| sea[i] = true);
+        }
+    }
+    sea
 }
 
 #[cfg(test)]
@@ -136,8 +208,17 @@ mod tests {
     }
 
     #[test]
-    fn voids_are_not_water() {
-        let land = strip(&[f32::NAN, f32::NAN, 3.0]);
+    fn voids_are_not_water_unless_their_rim_is_a_shore() {
+        let land = strip(&[f32::NAN, f32::NAN, 3.0, 80.0]);
+        assert_eq!(Water::flood(&land, 0.0), None);
+        let land = strip(&[f32::NAN, f32::NAN, 0.3, 9.0, 80.0]);
+        let water = Water::flood(&land, 0.0).expect("sea without data");
+        assert_eq!((water.flooded, water.open), (6, [true, false, true, true]));
+        assert!(water.floods(0) && !water.floods(2));
+        assert!((water.share_of_border() - 7.0 / 16.0).abs() < 0.1);
+        // A hole in the middle of the land is no sea, however low its rim.
+        let hole = (0..25).map(|i| if i == 12 { f32::NAN } else { 0.2 }).collect();
+        let land = Land::new(Raster::new(5, 5, DVec2::ONE, hole).expect("valid"));
         assert_eq!(Water::flood(&land, 0.0), None);
     }
 }
