@@ -330,7 +330,8 @@ fn files_that_join_are_drawn_as_one() {
         let out = desk.path("out.png");
         let quick = ["--size", "96x54", "--samples", "2", "--out", &out];
         let answer = json(&[&["render"], files, &quick].concat());
-        (pixels(&out), answer["eye"].clone(), answer["warnings"].clone())
+        // Warnings name the files.
+        (pixels(&out), answer["eye"].clone(), answer["warnings"].as_array().map(Vec::len))
     };
     let whole = drawn(&[&desk.land]);
     assert_eq!(drawn(&[&west, &middle, &east]), whole);

@@ -8,7 +8,7 @@ use crate::{Crs, Error, Georeference, Registration};
 use std::io;
 use std::path::Path;
 use tiff::encoder::colortype::{ColorType, Gray8, Gray32Float};
-use tiff::encoder::{Compression, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue};
+use tiff::encoder::{Compression, DeflateLevel, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, TiffValue};
 use tiff::tags::{Predictor, Tag};
 
 /// Samples of a grid, in the file's order (first row first).
@@ -147,8 +147,10 @@ impl Head<'_> {
     where
         [C::Inner]: TiffValue,
     {
+        // Bytes are masks: small in any case, and asked for quickly.
+        let level = if size_of::<C::Inner>() == 1 { DeflateLevel::Fast } else { DeflateLevel::Balanced };
         let mut encoder: TiffEncoder<_, K> = TiffEncoder::new_generic(sink)?
-            .with_compression(Compression::Deflate(tiff::encoder::DeflateLevel::Balanced))
+            .with_compression(Compression::Deflate(level))
             .with_predictor(Predictor::None);
         let mut image = encoder.new_image::<C>(self.width, self.height)?;
         let tags = image.encoder();
