@@ -89,7 +89,8 @@ pub struct Render {
     visibility: Option<f64>,
 
     /// Also depth, normal, position, height of what is seen, as floating point: into --out if that is an .exr, else into
-    /// an .exr beside it. Distances in metres; positions relative to the eye, X east, Y north, Z up
+    /// an .exr beside it. Distances in metres; positions relative to the eye, X east, Y north, Z up. Infinite, 0 or NaN
+    /// where there is neither land nor water
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PASS,…", help_heading = "Quality")]
     passes: Vec<Pass>,
     /// Rays through each pixel: more is smoother and slower

@@ -5,7 +5,8 @@ use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::noise::Fbm;
 use littoral::field::{Land, Raster, coast};
 use littoral::picture::{
-    Display, Drape, Picture, Scene, Settings, Shot, Stage, Style, Texture, Water, coast_shot, compose, overhead, render,
+    Border, Display, Drape, Picture, Scene, Settings, Shot, Stage, Style, Texture, Water, coast_shot, compose,
+    overhead, render,
 };
 use littoral::space::{Ray, View};
 use proptest::prelude::*;
@@ -79,6 +80,20 @@ fn passes_are_what_the_middle_of_each_pixel_sees() {
         }
     }
     assert!(seen.iter().all(|n| *n > 50), "{seen:?}");
+    // Without water the mist round the land is no surface, and neither is the floor round a block.
+    for border in [Border::Mist, Border::Cut] {
+        let picture = render(&Scene { border, ..Scene::new(&land, None) }, &view, &quick(1), &|_| {});
+        let highest = f64::from(land.height_range().high) + 1e-3;
+        let off = |i: &usize| {
+            let at = (eye + Vec3::from(picture.position[*i]).as_dvec3()).truncate();
+            !at.is_finite()
+                || (at.abs().cmple(land.extent() * 0.5 + 1e-2).all() && f64::from(picture.height[*i]) <= highest)
+        };
+        let beside: Vec<_> =
+            (0..48 * 27).filter(|i| !off(i)).map(|i| (i, picture.position[i], picture.height[i])).collect();
+        assert!(beside.is_empty(), "{border:?} has something beside the land: {beside:?}");
+        assert!(picture.depth.iter().filter(|depth| depth.is_infinite()).count() > 300);
+    }
 }
 
 #[test]

@@ -18,13 +18,13 @@ pub struct Picture {
     pub white: [f32; 3],
     /// Radiance as linear Rec. 709 red, green, blue, in kilocandela per square metre.
     pub radiance: Vec<[f32; 3]>,
-    /// Distance from the eye along the ray (m); infinite where there is sky.
+    /// Distance from the eye along the ray (m); infinite where there is neither land nor water.
     pub depth: Vec<f32>,
-    /// Unit normal of what is seen, in world axes; zero where there is sky.
+    /// Unit normal of what is seen, in world axes; zero where there is neither land nor water.
     pub normal: Vec<[f32; 3]>,
-    /// Position relative to the eye (m), in world axes; infinite where there is sky.
+    /// Position relative to the eye (m), in world axes; infinite where there is neither land nor water.
     pub position: Vec<[f32; 3]>,
-    /// Height of what is seen (m); NaN where there is sky.
+    /// Height of what is seen (m); NaN where there is neither land nor water.
     pub height: Vec<f32>,
     /// Share of the pixel that is not sky, in [0, 1].
     pub coverage: Vec<f32>,

@@ -29,7 +29,7 @@ pub struct Pixel {
     pub radiance: Vec3,
     /// Share that is not sky.
     pub coverage: f32,
-    /// Position and normal of what is seen through its middle.
+    /// Position and normal of the land or water seen through its middle.
     pub middle: Option<(DVec3, Vec3)>,
 }
 
@@ -181,13 +181,14 @@ impl Stage<'_> {
         lens.caster.first_hits(&rays, &mut distances);
         let seen =
             rays.iter().zip(&distances).map(|(ray, &distance)| match self.ahead(lens.eye, ray.direction, distance) {
-                Ahead::Sky => None,
-                Ahead::Mist { position } | Ahead::Water { position } | Ahead::Floor { position } => {
-                    Some((position, Vec3::Z))
-                }
+                // Mist and floor stand for what is not known: nothing was measured there.
+                Ahead::Sky | Ahead::Mist { .. } | Ahead::Floor { .. } => None,
+                Ahead::Water { position } => Some((position, Vec3::Z)),
                 Ahead::Wall(wall) => Some((wall.position, wall.normal)),
+                // The ground drawn reaches a little beyond the land, to dissolve into mist there.
                 Ahead::Ground { position } => {
-                    Some((position, self.ground.land.normal_at(position.truncate()).unwrap_or(Vec3::Z)))
+                    let normal = self.scene.land.normal_at(position.truncate());
+                    normal.map(|normal| (position, normal))
                 }
             });
         seen.collect()
@@ -290,7 +291,7 @@ mod tests {
             let (pyramid, patches) = (by(Land::first_hit), by(Land::first_hit_patch_by_patch));
             assert!(bits(&pyramid) == bits(&patches), "seed {seed}: the pyramid changes the picture");
             let hits = patches.depth.iter().filter(|d| d.is_finite()).count();
-            assert!(hits > 400, "seed {seed}: only {hits} pixels of land");
+            assert!(hits > 250, "seed {seed}: only {hits} pixels of land");
             // Streams work in single precision: here and there a shadow's edge falls on the other side of a sample.
             let streams = stage.render(&view, &settings, &|_| {});
             let light = |p: &Picture| p.radiance.iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
