@@ -344,6 +344,23 @@ proptest! {
     }
 }
 
+/// Rays along an axis, whose other component is zero of either sign.
+#[test]
+fn negative_zero_is_zero() {
+    let land = land(1, 40, 40, DVec2::ONE, Ground::Gentle, 0);
+    let eye = land.origin().extend(40.0) + DVec3::new(20.3, 20.7, 0.0);
+    let caster = land.caster(eye);
+    for along in [1.0f32, -1.0] {
+        for (plus, minus) in [
+            (Vec3::new(along, 0.0, -2.0), Vec3::new(along, -0.0, -2.0)),
+            (Vec3::new(0.0, along, -2.0), Vec3::new(-0.0, along, -2.0)),
+        ] {
+            let [plus, minus] = [plus, minus].map(|direction| caster.first_hit(&LocalRay::new(Vec3::ZERO, direction)));
+            assert!(plus.is_finite() && plus == minus, "{plus} and {minus} for {along}");
+        }
+    }
+}
+
 /// Rays with a width: never later than exact ones, and where earlier, at the top of a node that is not wider than they are.
 #[test]
 fn rays_by_footprint_stop_at_nodes_as_wide_as_they_are() {

@@ -158,7 +158,7 @@ impl<'a> RayCaster<'a> {
 
     /// [`RayCaster::view_hits`] by footprint: where a node of the range pyramid is not wider than `pixels` pixels there, its
     /// highest point stands for all of it. Never later than the exact hit, and earlier by no more than what such a node
-    /// holds; hardly faster at one pixel, and more so the further the eye and the finer the map.
+    /// holds.
     ///
     /// # Panics
     /// As [`RayCaster::view_hits`].

@@ -25,6 +25,9 @@ use glam::Vec4;
 /// Rays that fall or rise more than this many metres for each metre along their major axis count as steep.
 const STEEP: f32 = 16.0;
 
+/// Patches along an axis beyond which `f32` tells cells apart too badly.
+const MOST_PATCHES: i32 = 1 << 20;
+
 /// A land as this kernel sees it.
 #[derive(Clone, Debug)]
 pub(super) struct Single<'a> {
@@ -136,7 +139,7 @@ struct At {
 impl<'a> Single<'a> {
     /// `None` where the kernel does not apply: lands with voids and giants.
     pub fn new(land: &'a Land, scene: &Scene<'a>) -> Option<Single<'a>> {
-        if !scene.voids.is_empty() {
+        if !scene.voids.is_empty() || scene.cells.iter().any(|&cells| cells > MOST_PATCHES) {
             return None;
         }
         let blocks = &land.ranges().blocks;
@@ -194,10 +197,11 @@ impl<'a> Single<'a> {
         let reach = ray.reach;
         let origin = (Vec4::from_array(origin) * self.scale + self.offset).with_w(0.0);
         let direction = (Vec4::from_array(direction) * self.scale).with_w(0.0);
-        let signs = direction.is_negative_bitmask() as usize & 7;
+        // By comparison: a zero with a sign runs forward.
+        let backward = direction.cmplt(Vec4::ZERO);
+        let signs = backward.bitmask() as usize & 7;
         let octant = &self.octants[signs];
         let size = direction.abs();
-        let backward = direction.cmplt(Vec4::ZERO);
         let at = Vec4::select(backward, -origin, origin);
         let inverse = Vec4::ONE / size.max(Vec4::splat(1e-20));
         let (enter, leave) = ((octant.low - at) * inverse, (octant.high - at) * inverse);
