@@ -186,11 +186,11 @@ impl WaveModel for Cascades {
     }
 
     fn add_displacement(&self, points: &Points, motion: &mut Motion) {
-        self.patches.iter().for_each(|patch| query::add(patch, points, false, motion));
+        query::add(&self.patches, points, false, motion);
     }
 
     fn add_motion(&self, points: &Points, motion: &mut Motion) {
-        self.patches.iter().for_each(|patch| query::add(patch, points, true, motion));
+        query::add(&self.patches, points, true, motion);
     }
 
     fn add_velocity(&self, points: &Points, depths: &[f32; BLOCK], velocity: &mut Velocity) {

@@ -77,48 +77,89 @@ fn levels(patch: &Patch, points: &Points) -> Levels {
 
 /// The samples at the corners of the patches in which points lie: those of the lower row, then those of the upper row; eight fields of the left
 /// one, then of the right one.
-struct Corners {
-    low: [Lane; 16],
-    high: [Lane; 16],
+pub(super) struct Corners {
+    pub low: [Lane; 16],
+    pub high: [Lane; 16],
     /// Where in the patch, from 0 to 1.
-    u: Lane,
-    v: Lane,
+    pub u: Lane,
+    pub v: Lane,
     /// Length of the patch's sides (m).
-    side: Lane,
+    pub side: Lane,
 }
 
 impl Corners {
     #[inline(always)]
-    fn zero() -> Corners {
+    pub fn zero() -> Corners {
         let none = [[0.0; LANES]; 16];
         Corners { low: none, high: none, u: [0.0; LANES], v: [0.0; LANES], side: [1.0; LANES] }
     }
 }
 
-/// Corners in the finest level.
+/// Where points lie among the samples of the finest level.
+struct Cells {
+    place: Place,
+    /// Where the pairs of samples begin.
+    low: [u32; LANES],
+    high: [u32; LANES],
+    u: Lane,
+    v: Lane,
+}
+
+/// Finds points among the samples of the finest level, and calls for those.
 #[inline(always)]
-fn finest(patch: &Patch, place: &Place, corners: &mut Corners) {
+fn locate(patch: &Patch, points: &Points) -> Cells {
+    let place = place(patch, points);
     let n = patch.tile.samples;
-    let (samples, stride) = (patch.level(0), 16 * motion_stride(n));
     let size = n as f64;
+    let (last, stride) = (n as u32 - 1, 16 * motion_stride(n) as u32);
     let (mut low, mut high) = ([0u32; LANES], [0u32; LANES]);
-    let (last, stride) = (n as u32 - 1, stride as u32);
+    let (mut u, mut v) = ([0.0; LANES], [0.0; LANES]);
     for l in 0..LANES {
         let (x, y) = (place.x[l] * size, place.y[l] * size);
         let (i, j) = (x as i32, y as i32);
-        corners.u[l] = (x - f64::from(i)) as f32;
-        corners.v[l] = (y - f64::from(j)) as f32;
+        u[l] = (x - f64::from(i)) as f32;
+        v[l] = (y - f64::from(j)) as f32;
         // A part can round up to the whole side.
         let (i, j) = (i as u32 & last, j as u32 & last);
         low[l] = j * stride + 8 * i;
         high[l] = ((j + 1) & last) * stride + 8 * i;
     }
+    let samples = patch.level(0);
     for l in 0..LANES {
-        let (low, high) = (low[l] as usize, high[l] as usize);
+        prefetch(samples, low[l]);
+        prefetch(samples, high[l]);
+    }
+    Cells { place, low, high, u, v }
+}
+
+/// Calls for sixteen numbers, which may lie in two lines of the cache.
+#[inline(always)]
+fn prefetch(samples: &[f32], at: u32) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let start = samples.as_ptr().wrapping_add(at as usize);
+        // SAFETY: fetching ahead reads nothing, wherever it points.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(start.cast());
+            _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(15).cast());
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (samples, at);
+}
+
+/// Corners in the finest level.
+#[inline(always)]
+fn finest(patch: &Patch, cells: &Cells, corners: &mut Corners) {
+    let samples = patch.level(0);
+    for l in 0..LANES {
+        let (low, high) = (cells.low[l] as usize, cells.high[l] as usize);
         corners.low[l].copy_from_slice(&samples[low..low + 16]);
         corners.high[l].copy_from_slice(&samples[high..high + 16]);
     }
-    corners.side = [(patch.tile.length / size) as f32; LANES];
+    (corners.u, corners.v) = (cells.u, cells.v);
+    corners.side = [(patch.tile.length / patch.tile.samples as f64) as f32; LANES];
     transpose(&mut corners.low);
     transpose(&mut corners.high);
 }
@@ -180,7 +221,7 @@ fn patched(c: [[f32; 3]; 4], a: [f32; 4], b: [f32; 4]) -> f32 {
 
 /// A field and its derivatives at the corners, for one lane.
 #[inline(always)]
-fn at_corners(c: &Corners, l: usize, f: usize, x: usize, y: usize) -> [[f32; 3]; 4] {
+pub(super) fn at_corners(c: &Corners, l: usize, f: usize, x: usize, y: usize) -> [[f32; 3]; 4] {
     [
         [c.low[f][l], c.low[x][l], c.low[y][l]],
         [c.low[8 + f][l], c.low[8 + x][l], c.low[8 + y][l]],
@@ -233,47 +274,53 @@ fn incline(c: &Corners, turn: (f32, f32), weights: &Lane, motion: &mut Motion) {
     }
 }
 
-/// Adds a tile's motion; displacements only unless `whole`.
+/// Adds the motion of all tiles; displacements only unless `whole`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-pub(super) fn add(patch: &Patch, points: &Points, whole: bool, motion: &mut Motion) {
-    add_body(patch, points, whole, motion);
+pub(super) fn add(patches: &[Patch], points: &Points, whole: bool, motion: &mut Motion) {
+    add_body(patches, points, whole, motion);
 }
 
 #[inline(always)]
-pub(super) fn add_body(patch: &Patch, points: &Points, whole: bool, motion: &mut Motion) {
-    let place = place(patch, points);
-    let levels = levels(patch, points);
-    let turn = (patch.turn.0 as f32, patch.turn.1 as f32);
+pub(super) fn add_body(patches: &[Patch], points: &Points, whole: bool, motion: &mut Motion) {
+    let Some(first) = patches.first() else { return };
+    // Samples of the next tile are on their way while those of this one are summed.
+    let mut next = locate(first, points);
     let mut corners = Corners::zero();
-    if levels.all {
-        finest(patch, &place, &mut corners);
-        let weights = [1.0; LANES];
-        displace(&corners, turn, &weights, motion);
-        if whole {
-            incline(&corners, turn, &weights, motion);
-        }
-    } else {
-        for step in 0..2 {
-            let (mut of, mut weights) = (levels.finer, levels.share);
-            for l in 0..LANES {
-                of[l] += step;
-                weights[l] = if step == 0 { 1.0 - weights[l] } else { weights[l] };
-            }
-            leveled(patch, &place, &of, &mut weights, &mut corners);
+    for (index, patch) in patches.iter().enumerate() {
+        let cells = next;
+        next = locate(&patches[(index + 1).min(patches.len() - 1)], points);
+        let levels = levels(patch, points);
+        let turn = (patch.turn.0 as f32, patch.turn.1 as f32);
+        if levels.all {
+            finest(patch, &cells, &mut corners);
+            let weights = [1.0; LANES];
             displace(&corners, turn, &weights, motion);
             if whole {
                 incline(&corners, turn, &weights, motion);
             }
+        } else {
+            for step in 0..2 {
+                let (mut of, mut weights) = (levels.finer, levels.share);
+                for l in 0..LANES {
+                    of[l] += step;
+                    weights[l] = if step == 0 { 1.0 - weights[l] } else { weights[l] };
+                }
+                leveled(patch, &cells.place, &of, &mut weights, &mut corners);
+                displace(&corners, turn, &weights, motion);
+                if whole {
+                    incline(&corners, turn, &weights, motion);
+                }
+            }
+            if whole {
+                hide(patch, &levels, motion);
+            }
         }
-        if whole {
-            hide(patch, &levels, motion);
-        }
-    }
-    if let (Some(foam), true) = (&patch.foam, whole) {
-        for l in 0..LANES {
-            let width = f64::from(points.footprint[l]) * patch.tile.samples as f64 / patch.tile.length;
-            let covered = foam_at(foam, patch.tile.samples, place.x[l], place.y[l], width as f32);
-            motion.foam[l] += covered - motion.foam[l] * covered;
+        if let (Some(foam), true) = (&patch.foam, whole) {
+            for l in 0..LANES {
+                let width = f64::from(points.footprint[l]) * patch.tile.samples as f64 / patch.tile.length;
+                let covered = foam_at(foam, patch.tile.samples, cells.place.x[l], cells.place.y[l], width as f32);
+                motion.foam[l] += covered - motion.foam[l] * covered;
+            }
         }
     }
 }

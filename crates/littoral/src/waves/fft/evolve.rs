@@ -121,12 +121,22 @@ impl Fields {
     }
 }
 
-/// Sine and cosine of a number of turns, to 4e-9 beside the rounding of `f32`.
+/// What is left of phases (turns) without their whole turns, in [−½, ½].
 #[inline(always)]
-fn sine_cosine(turns: f64) -> (f32, f32) {
+fn phases(turns: &[f64; LANES], time: f64) -> Lane {
     // Adding and taking off 1.5 · 2⁵² rounds to the nearest whole number.
     const ROUNDER: f64 = 6_755_399_441_055_744.0;
-    let r = (turns - ((turns + ROUNDER) - ROUNDER)) as f32;
+    let mut rest = [0.0; LANES];
+    for l in 0..LANES {
+        let turns = turns[l] * time;
+        rest[l] = (turns - ((turns + ROUNDER) - ROUNDER)) as f32;
+    }
+    rest
+}
+
+/// Sine and cosine of a phase from −½ to ½ turn, to 4e-9 beside the rounding of `f32`.
+#[inline(always)]
+fn sine_cosine(r: f32) -> (f32, f32) {
     let size = r.abs();
     let folded = (0.25 - (size - 0.25).abs()).copysign(r);
     (quarter_sine(folded), quarter_sine(0.25 - size))
@@ -172,6 +182,11 @@ pub(crate) fn pack(waves: &Waves, grid: &Grid, group: i32, time: f64, fields: Fi
     let kx = wave_numbers(group, waves.step);
     let columns = waves.group(group);
     let middle = if grid.narrow { n / 4 } else { n / 2 };
+    // Wave numbers below the limit fill a disc.
+    let nearest = if group < 0 { -16 * group - 15 } else { 16 * group };
+    let nearest = f64::from(nearest) * waves.step;
+    let chord = (f64::from(grid.limit) - nearest * nearest).max(0.0).sqrt() / waves.step;
+    let rows = rows.min(chord as i32);
     packed[4 * (rows + 1) as usize..4 * middle as usize].fill(Wide::ZERO);
     packed[4 * (n - middle) as usize..4 * (n - rows) as usize].fill(Wide::ZERO);
     for row in -rows..=rows {
@@ -192,8 +207,9 @@ pub(crate) fn pack(waves: &Waves, grid: &Grid, group: i32, time: f64, fields: Fi
 #[inline(always)]
 fn motion(column: &Column, kx: &Lane, ky: f32, limit: f32, time: f64, out: &mut [Wide; 4]) {
     let (s, d) = (&column.sum, &column.difference);
+    let phases = phases(&column.turns, time);
     for l in 0..LANES {
-        let (sine, cosine) = sine_cosine(column.turns[l] * time);
+        let (sine, cosine) = sine_cosine(phases[l]);
         let (x, reach) = (kx[l], column.reach[l]);
         let there = if x.mul_add(x, ky * ky) < limit { 1.0 } else { 0.0 };
         let re = d.im[l].mul_add(sine, s.re[l] * cosine) * there;
@@ -212,8 +228,9 @@ fn motion(column: &Column, kx: &Lane, ky: f32, limit: f32, time: f64, out: &mut 
 #[inline(always)]
 fn stretch(column: &Column, kx: &Lane, ky: f32, limit: f32, time: f64, out: &mut [Wide; 4]) {
     let (s, d) = (&column.sum, &column.difference);
+    let phases = phases(&column.turns, time);
     for l in 0..LANES {
-        let (sine, cosine) = sine_cosine(column.turns[l] * time);
+        let (sine, cosine) = sine_cosine(phases[l]);
         let x = kx[l];
         let there = if x.mul_add(x, ky * ky) < limit { -column.reach[l] } else { 0.0 };
         let re = d.im[l].mul_add(sine, s.re[l] * cosine) * there;
@@ -229,8 +246,9 @@ fn stretch(column: &Column, kx: &Lane, ky: f32, limit: f32, time: f64, out: &mut
 fn velocity(column: &Column, kx: &Lane, ky: f32, limit: f32, time: f64, how: [f32; 4], out: &mut [Wide; 4]) {
     let [depth, bed, angular, choppiness] = how;
     let (s, d) = (&column.sum, &column.difference);
+    let phases = phases(&column.turns, time);
     for l in 0..LANES {
-        let (sine, cosine) = sine_cosine(column.turns[l] * time);
+        let (sine, cosine) = sine_cosine(phases[l]);
         let x = kx[l];
         let square = x.mul_add(x, ky * ky);
         let k = square.sqrt();
@@ -257,7 +275,7 @@ mod tests {
     fn elementary_functions_are_right() {
         for i in -40_000..40_000 {
             let turns = f64::from(i) / 9973.0 + 1e5 * f64::from(i % 7);
-            let (sine, cosine) = sine_cosine(turns);
+            let (sine, cosine) = sine_cosine(phases(&[turns; LANES], 1.0)[3]);
             let angle = std::f64::consts::TAU * (turns - turns.round());
             assert!((f64::from(sine) - angle.sin()).abs() < 2.5e-7, "{turns}");
             assert!((f64::from(cosine) - angle.cos()).abs() < 2.5e-7, "{turns}");
