@@ -131,7 +131,15 @@ impl Cascades {
         let highest = tiles.iter().map(|tile| tile.highest).fold(0.0, f64::max);
         let energies: Vec<Energy> = states.iter().map(|state| Energy::new(state, 1.1 * highest)).collect();
         let patch = |(index, tile): (usize, &Tile)| Patch::new(*tile, index, states, &energies, options);
-        let patches = tiles.par_iter().enumerate().map(patch).collect();
+        let mut patches: Vec<Patch> = tiles.par_iter().enumerate().map(patch).collect();
+        let sharing = patches.iter().filter(|patch| patch.foam.is_some()).count();
+        for (index, foam) in patches.iter_mut().filter_map(|patch| patch.foam.as_mut()).enumerate() {
+            foam.share = match (index, sharing) {
+                (0, 1) => 1.0,
+                (0, _) => foam::FIRST_SHARE,
+                _ => (1.0 - foam::FIRST_SHARE) / (sharing - 1) as f64,
+            };
+        }
         let mut sea = Cascades { patches, clock, time: 0.0, bounds: OnceLock::new(), run: Run::TOGETHER };
         sea.set_time(0.0);
         sea

@@ -13,7 +13,7 @@ use super::super::fft::{LANES, Lane};
 use super::clock::{Instant, Moment};
 use super::patch::Lazy;
 use super::plan::Tile;
-use libm::{exp, log, pow, sqrt};
+use libm::{exp, log, log1p, pow, sqrt};
 use std::f64::consts::TAU;
 
 /// In which foam fades to 1/e (s); Monahan and others found 3 to 4 s in sea water.
@@ -22,8 +22,11 @@ const FADING: f64 = 3.0;
 const LEAST_BREAKER: f64 = 3.0;
 /// Foam is full where the Jacobian is this many standard deviations below the threshold.
 const FULL: f64 = 0.5;
-/// Mean cover over the chance of a Jacobian below the threshold at an instant: foam outlives its breaker. Found by experiment.
-const PERSISTENCE: f64 = 2.0;
+/// Mean cover over the chance of a Jacobian below the threshold at an instant: foam outlives its breaker. Found by experiment with seas of 3
+/// to 10 Beaufort.
+const PERSISTENCE: f64 = 2.3;
+/// The part of the cover that is made by the first tile with foam, if there are others.
+pub(super) const FIRST_SHARE: f64 = 0.7;
 
 /// The foam of a tile.
 pub(super) struct Foam {
@@ -39,11 +42,20 @@ pub(super) struct Foam {
     tick: Option<i64>,
     /// Variance of the stretch, by state.
     stretches: Vec<f64>,
+    /// Its part of the whole cover.
+    pub share: f64,
 }
 
 /// The share of the sea that foam covers at a wind speed (m/s).
 pub(super) fn cover(wind: f64) -> f64 {
     (3.84e-6 * pow(wind.max(0.0), 3.41)).min(0.5)
+}
+
+/// By how much more or less foam there is where the longer waves stand this many standard deviations high: short waves break upon the crests
+/// of long ones. The mean is 1. It also keeps one tile's foam from showing its period.
+#[inline(always)]
+pub(super) fn upon(height: f32) -> f32 {
+    (1.0 + 0.8 * height).clamp(0.0, 2.6)
 }
 
 impl Foam {
@@ -60,6 +72,7 @@ impl Foam {
             samples: tile.samples,
             tick: None,
             stretches: stretches.to_vec(),
+            share: 1.0,
         })
     }
 
@@ -103,8 +116,10 @@ impl Foam {
         let (state, share) = moment.blend;
         let next = self.stretches[(state + 1).min(self.stretches.len() - 1)];
         let deviation = sqrt(self.stretches[state] + (next - self.stretches[state]) * share);
-        let chance = cover(moment.wind) / PERSISTENCE;
-        if chance < 1e-7 || deviation < 1e-4 {
+        // Tiles with foam overlap by chance, and so do whitecaps of different times.
+        let cover = cover(moment.wind).max(1e-6);
+        let chance = -log1p(-cover) * self.share / PERSISTENCE;
+        if cover <= 1e-6 || deviation < 1e-4 {
             return Foaming { decay, threshold: -1e3, steepness: 1.0 };
         }
         let threshold = 1.0 - deviation * deviations(chance);

@@ -150,6 +150,19 @@ impl Patch {
                 }
             }
         }
+        // What a lattice gains or loses along the edges of the band (some percent) is evened out.
+        for (state, sea) in states.iter().enumerate() {
+            let frequency = |k: f64| water.angular_frequency(k) / TAU;
+            let low = frequency(tile.lowest).max(sea.band().map_or(0.0, |(low, _)| 0.5 * low));
+            let held = variances[state][0][3];
+            if held <= 0.0 || low >= frequency(tile.highest) {
+                continue;
+            }
+            let scale = (sea.moment(0, low, frequency(tile.highest)) / held).clamp(0.5, 2.0);
+            shares[state].iter_mut().flatten().flatten().for_each(|share| *share = (f64::from(*share) * scale) as f32);
+            variances[state].iter_mut().flatten().for_each(|variance| *variance *= scale);
+            stretches[state] *= scale;
+        }
         let coarser = grids[1..].iter().map(|_| Lazy::new()).collect();
         let rows_of_samples = tile.samples * steps::motion_stride(tile.samples);
         let mut patch = Patch {

@@ -12,7 +12,7 @@ use super::super::fft::kernel::transpose;
 use super::super::fft::steps::{field, motion_stride};
 use super::super::fft::{LANES, Lane};
 use super::super::model::{BLOCK, Motion, Points};
-use super::foam::Foam;
+use super::foam::{Foam, upon};
 use super::patch::Patch;
 use multiversion::multiversion;
 
@@ -62,6 +62,13 @@ struct Levels {
 fn levels(patch: &Patch, points: &Points) -> Levels {
     let scale = (patch.tile.highest / std::f64::consts::PI) as f32;
     let mut levels = Levels { finer: [0; BLOCK], share: [0.0; BLOCK], all: true };
+    let mut wide = 0;
+    for footprint in points.footprint {
+        wide += u32::from(footprint * scale > 1.0);
+    }
+    if wide == 0 {
+        return levels;
+    }
     for l in 0..LANES {
         let ratio = points.footprint[l] * scale;
         // Also 1 for NaN.
@@ -286,11 +293,24 @@ pub(super) fn add_body(patches: &[Patch], points: &Points, whole: bool, motion: 
     // Samples of the next tile are on their way while those of this one are summed.
     let mut next = locate(first, points);
     let mut corners = Corners::zero();
+    let before = motion.dz;
+    let mut variance = 0.0;
     for (index, patch) in patches.iter().enumerate() {
         let cells = next;
         next = locate(&patches[(index + 1).min(patches.len() - 1)], points);
         let levels = levels(patch, points);
         let turn = (patch.turn.0 as f32, patch.turn.1 as f32);
+        if let (Some(foam), true) = (&patch.foam, whole) {
+            // What has been summed so far are the longer waves.
+            let scale = if variance > 0.0 { 1.0 / libm::sqrt(variance) as f32 } else { 0.0 };
+            for l in 0..LANES {
+                let width = f64::from(points.footprint[l]) * patch.tile.samples as f64 / patch.tile.length;
+                let covered = foam_at(foam, patch.tile.samples, cells.place.x[l], cells.place.y[l], width as f32);
+                let covered = (covered * upon((motion.dz[l] - before[l]) * scale)).min(1.0);
+                motion.foam[l] += covered - motion.foam[l] * covered;
+            }
+        }
+        variance += patch.present[0][3];
         if levels.all {
             finest(patch, &cells, &mut corners);
             let weights = [1.0; LANES];
@@ -313,13 +333,6 @@ pub(super) fn add_body(patches: &[Patch], points: &Points, whole: bool, motion: 
             }
             if whole {
                 hide(patch, &levels, motion);
-            }
-        }
-        if let (Some(foam), true) = (&patch.foam, whole) {
-            for l in 0..LANES {
-                let width = f64::from(points.footprint[l]) * patch.tile.samples as f64 / patch.tile.length;
-                let covered = foam_at(foam, patch.tile.samples, cells.place.x[l], cells.place.y[l], width as f32);
-                motion.foam[l] += covered - motion.foam[l] * covered;
             }
         }
     }
