@@ -6,10 +6,8 @@ use crate::input::{self, Target, WaterLevel};
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
-use littoral::field::{Land, coast};
-use littoral::picture::{
-    self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture, Water,
-};
+use littoral::field::{Land, Water, coast};
+use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
 use littoral::space::{Ray, View};
 use littoral_data::write::{self, Layer, PngPixels};
 use serde::Serialize;

@@ -31,15 +31,13 @@ mod spectrum;
 mod stage;
 mod texture;
 mod tile;
-mod water;
 
 pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
 pub use display::{Display, Exposure, Medium, Picture};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
-pub use water::Water;
 
-use crate::field::Land;
+use crate::field::{Land, Water};
 use crate::space::View;
 use glam::DVec3;
 
