@@ -23,6 +23,20 @@ pub struct Sea {
     time: f64,
 }
 
+impl std::fmt::Debug for Sea {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Sea { models, level, datum, bounds, time } = self;
+        let models = models.len();
+        f.debug_struct("Sea")
+            .field("models", &models)
+            .field("level", level)
+            .field("datum", datum)
+            .field("bounds", bounds)
+            .field("time", time)
+            .finish()
+    }
+}
+
 /// The water's surface at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
@@ -191,6 +205,11 @@ impl Sea {
         found.motion = Motion::STILL;
         self.models.iter().for_each(|m| m.add_motion(&found.rest, &mut found.motion));
         found
+    }
+
+    /// Adds the displacement of the water that rests at some places.
+    pub(crate) fn displacement(&self, rest: &Points, motion: &mut Motion) {
+        self.models.iter().for_each(|m| m.add_displacement(rest, motion));
     }
 
     /// The same with displacements only.

@@ -9,6 +9,7 @@ use super::sea::Depths;
 use super::shade::Ahead;
 use super::skylight::{Skylight, irradiance};
 use super::tile::{Mosaic, Pixel, TILE};
+use super::waves::Wet;
 use super::{Medium, Picture, Scene, Settings, Style};
 use crate::raycast::{LocalRay, RayCaster};
 use crate::space::View;
@@ -146,8 +147,8 @@ impl<'a> Stage<'a> {
         picture
     }
 
-    /// What a ray from the eye meets, where `ground` is its distance to the ground (m).
-    pub(super) fn ahead(&self, eye: DVec3, direction: Vec3, ground: f32) -> Ahead {
+    /// What a ray from the eye meets, where `ground` is its distance to the ground (m) and `wet` the sea before that.
+    pub(super) fn ahead(&self, eye: DVec3, direction: Vec3, ground: f32, wet: Option<Wet>) -> Ahead {
         let direction = direction.as_dvec3();
         let ground = f64::from(ground);
         if let Some(block) = &self.ground.block {
@@ -156,7 +157,10 @@ impl<'a> Stage<'a> {
                 return Ahead::Wall(wall);
             }
         }
-        if let Some(water) = self.scene.water.filter(|_| !self.is_map()) {
+        if let Some(wet) = wet {
+            return Ahead::Water { position: wet.position, wet: Some(wet) };
+        }
+        if let Some(water) = self.scene.water.filter(|_| self.scene.sea.is_none() && !self.is_map()) {
             // Still water is level; beyond the raster it bends with the Earth, which sets the horizon.
             let rise = eye.z - water.level;
             if rise > 0.0 {
@@ -175,7 +179,8 @@ impl<'a> Stage<'a> {
                     && t <= ground * (1.0 + 1e-7)
                     && water.covers((eye + direction * t).truncate())
                 {
-                    return Ahead::Water { position: (eye + direction * t).truncate().extend(water.level) };
+                    let position = (eye + direction * t).truncate().extend(water.level);
+                    return Ahead::Water { position, wet: None };
                 }
             }
         }
