@@ -23,6 +23,8 @@ pub struct Wet {
     pub hidden: Vec3,
     /// How much of it is foam, in [0, 1].
     pub foam: f32,
+    /// Where this water rests (m): foam drifts with it.
+    pub rest: DVec2,
 }
 
 impl Wet {
@@ -168,7 +170,7 @@ impl Stage<'_> {
             let at = DVec2::new(points.x[i], points.y[i]);
             let surface = sea.surface(&found, i);
             let position = at.extend(surface.height - self.drop_at(at));
-            Some(Wet { position, slope: surface.slope, hidden: surface.hidden, foam: surface.foam })
+            Some(Wet { position, slope: surface.slope, hidden: surface.hidden, foam: surface.foam, rest: surface.rest })
         };
         (0..rays.len()).map(wet).collect()
     }
