@@ -17,6 +17,8 @@ pub mod spec;
 mod spectrum;
 mod spreading;
 mod state;
+mod sum;
+mod superposition;
 
 pub use components::PlaneWave;
 pub use dispersion::{STANDARD_GRAVITY, SURFACE_TENSION, StillWater};
@@ -25,6 +27,7 @@ pub use model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};
 pub use state::{SeaState, Slice, Train, Wind, bearing_from_heading, heading_from_bearing};
+pub use superposition::Superposition;
 
 /// A number that makes no sense where it was given.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
