@@ -18,6 +18,8 @@ pub mod spec;
 mod spectrum;
 mod spreading;
 mod state;
+mod sum;
+mod superposition;
 
 pub use components::PlaneWave;
 pub use dispersion::{STANDARD_GRAVITY, SURFACE_TENSION, StillWater};
@@ -27,6 +29,7 @@ pub use sheltered::{Shelter, Sheltered};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};
 pub use state::{SeaState, Slice, Train, Wind, bearing_from_heading, heading_from_bearing};
+pub use superposition::Superposition;
 
 /// A number that makes no sense where it was given.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
