@@ -99,10 +99,7 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
-    pub(crate) fn new(
-        waves: impl IntoIterator<Item = Pushing>,
-        water: StillWater,
-    ) -> Result<Sum, OutOfRange> {
+    pub(crate) fn new(waves: impl IntoIterator<Item = Pushing>, water: StillWater) -> Result<Sum, OutOfRange> {
         let water = water.checked()?;
         let mut waves: Vec<Pushing> = waves.into_iter().collect();
         let count = waves.len();
@@ -117,11 +114,9 @@ impl Sum {
             OutOfRange::unless(wave.phase.abs() <= 1e6, "phase", "rad, within ±1e6", wave.phase)?;
             OutOfRange::unless((0.0..=1e4).contains(push), "steepness", "a number from 0 to 10 000", *push)?;
         }
-        waves.sort_by(|a, b| {
-            b.wave.wavenumber.length_squared().total_cmp(&a.wave.wavenumber.length_squared())
-        });
+        waves.sort_by(|a, b| b.wave.wavenumber.length_squared().total_cmp(&a.wave.wavenumber.length_squared()));
         let (mut slopes, mut hidden, mut rough) = (Vec::new(), vec![[0f32; 3]], vec![0f32]);
-        let mut bounds = [0.0; 5];
+        let mut bounds = [0.0; 6];
         for Pushing { wave, push } in &waves {
             let (a, k) = (wave.amplitude, wave.wavenumber);
             let half = 0.5 * a * a;
@@ -131,12 +126,12 @@ impl Sum {
             hidden.push([0, 1, 2].map(|i| before[i] + covariance[i]));
             rough.push(rough[rough.len() - 1] + (a * push.max(1.0)) as f32);
             let k = k.length();
-            for (sum, part) in bounds.iter_mut().zip([a, push * a, k * a, push * k * a, k * k * a]) {
+            for (sum, part) in bounds.iter_mut().zip([a, push * a, k * a, push * k * a, k * k * a, push * k * k * a]) {
                 *sum += part;
             }
         }
         // A little above the sums, for what `f32` rounds.
-        let [height, sideways, slope, stretch, curvature] = bounds.map(|sum| (sum * (1.0 + 1e-5)) as f32);
+        let [height, sideways, slope, stretch, curvature, bend] = bounds.map(|sum| (sum * (1.0 + 1e-5)) as f32);
         let mut sum = Sum {
             water,
             hot: waves.iter().map(|wave| Hot::new(wave, water)).collect(),
@@ -148,7 +143,7 @@ impl Sum {
             slopes,
             hidden,
             rough,
-            bounds: Bounds { height, sideways, slope, stretch, curvature },
+            bounds: Bounds { height, sideways, slope, stretch, curvature, bend },
         };
         sum.set_time(0.0);
         Ok(sum)
@@ -259,7 +254,8 @@ fn localise(sum: &Sum, points: &Points) -> Local {
         // Written so that what is not a number becomes a number.
         let x = points.x[lane].max(-FARTHEST).min(FARTHEST);
         let y = points.y[lane].max(-FARTHEST).min(FARTHEST);
-        let (cell_x, cell_y) = ((x * (1.0 / CELL)).floor() * CELL + 0.5 * CELL, (y * (1.0 / CELL)).floor() * CELL + 0.5 * CELL);
+        let (cell_x, cell_y) =
+            ((x * (1.0 / CELL)).floor() * CELL + 0.5 * CELL, (y * (1.0 / CELL)).floor() * CELL + 0.5 * CELL);
         local.x[lane] = (x - cell_x) as f32;
         local.y[lane] = (y - cell_y) as f32;
         local.cell_x[lane] = cell_x;

@@ -5,7 +5,9 @@
 //! down only, and each wave is the linear one of G. Airy, 1845.
 
 use super::sum::{Pushing, Sum};
-use super::{BLOCK, Bounds, Motion, OutOfRange, PlaneWave, Points, SeaState, StillWater, Velocity, WaveModel, components};
+use super::{
+    BLOCK, Bounds, Motion, OutOfRange, PlaneWave, Points, SeaState, StillWater, Velocity, WaveModel, components,
+};
 use std::f64::consts::TAU;
 
 /// A sea of plane waves, each on its own way.
