@@ -9,7 +9,9 @@
 
 use super::{HeightField, HeightRange, Land, Water};
 use crate::space::{Cell, Datum, Place};
-use crate::waves::{BLOCK, Bounds, Motion, Points, SeaState, Shelter, Sheltered, Superposition, Velocity, WaveModel};
+use crate::waves::{
+    BLOCK, Bounds, Motion, OutOfRange, Points, SeaState, Shelter, Sheltered, Superposition, Velocity, WaveModel,
+};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -79,6 +81,19 @@ impl Sea {
     /// Still water at a level (m), to which models of waves may be added, over a datum, which must be a plane.
     pub fn new(datum: Datum, level: f64) -> Sea {
         Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0 }
+    }
+
+    /// The open sea of a state, at a level (m), as deep as the state says.
+    ///
+    /// # Errors
+    /// If a number of the state makes no sense.
+    pub fn of_state(datum: Datum, level: f64, state: &SeaState) -> Result<Sea, OutOfRange> {
+        let sea = Sea::new(datum, level);
+        let (Some((low, high)), Some(peak)) = (state.band(), state.peak()) else { return Ok(sea) };
+        let mut waves = crate::waves::components::drawn(state, 64, low, 2.0 * peak);
+        waves.extend(crate::waves::components::drawn(state, 64, 2.0 * peak, high));
+        waves.extend(crate::waves::components::drawn(state, 64, high, 2.5f64.max(1.5 * high)));
+        Ok(sea.with(Box::new(Superposition::new(&waves, state.water())?)))
     }
 
     /// The sea of a state over `water` on `land`; `None` for a calm.
