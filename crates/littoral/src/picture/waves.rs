@@ -97,7 +97,7 @@ impl Stage<'_> {
             }
         });
         let place = |lane: usize, t: f64| origin(&rays[lane.min(rays.len() - 1)]) + lanes_direction(rays, lane) * t;
-        for _ in 0..STEPS {
+        for step in 0..STEPS {
             if !lanes.iter().any(|l| l.walking) {
                 break;
             }
@@ -121,7 +121,10 @@ impl Stage<'_> {
                         continue;
                     }
                     lane.above = (lane.at, clear);
-                    let least = 0.3 * f64::from(self.footprint(lens, lane.at as f32, -lane.direction.z as f32)) + 0.004;
+                    let footprint = f64::from(self.footprint(lens, lane.at as f32, -lane.direction.z as f32));
+                    // Waves at least two footprints long and no higher than the highest.
+                    let steep = steep.min(std::f64::consts::PI * reach / footprint);
+                    let least = footprint * (0.3 + 0.02 * step as f64) + 0.004;
                     lane.at += (clear / (-lane.direction.z + steep * flat).max(1e-3)).max(least);
                 }
                 if lane.above.0 >= lane.end {
@@ -130,6 +133,10 @@ impl Stage<'_> {
                     lane.at = lane.at.min(lane.end);
                 }
             }
+        }
+        // One that goes on and on between the waves, far away, has all but met them.
+        for lane in lanes.iter_mut().filter(|l| l.walking) {
+            lane.below = Some((lane.at, 0.0));
         }
         for _ in 0..CLOSE {
             for lane in &mut lanes {
