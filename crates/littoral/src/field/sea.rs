@@ -10,7 +10,8 @@
 use super::{HeightField, HeightRange, Land, Water};
 use crate::space::{Cell, Datum, Place};
 use crate::waves::{
-    BLOCK, Bounds, Motion, OutOfRange, Points, SeaState, Shelter, Sheltered, Superposition, Velocity, WaveModel,
+    BLOCK, Bounds, Motion, OutOfRange, Points, STANDARD_GRAVITY, SeaState, Shelter, Sheltered, Superposition, Velocity,
+    WaveModel,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -23,11 +24,21 @@ pub struct Sea {
     datum: Datum,
     bounds: Bounds,
     time: f64,
+    finest: Finest,
+}
+
+/// The ripples that are too fine for any model: slopes without heights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Finest {
+    /// Variance of their slopes in each direction.
+    pub variance: f32,
+    /// Where they run to (rad, counter-clockwise from x).
+    pub heading: f64,
 }
 
 impl std::fmt::Debug for Sea {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Sea { models, level, datum, bounds, time } = self;
+        let Sea { models, level, datum, bounds, time, finest } = self;
         let models = models.len();
         f.debug_struct("Sea")
             .field("models", &models)
@@ -35,6 +46,7 @@ impl std::fmt::Debug for Sea {
             .field("datum", datum)
             .field("bounds", bounds)
             .field("time", time)
+            .field("finest", finest)
             .finish()
     }
 }
@@ -80,7 +92,7 @@ impl Sea {
 
     /// Still water at a level (m), to which models of waves may be added, over a datum, which must be a plane.
     pub fn new(datum: Datum, level: f64) -> Sea {
-        Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0 }
+        Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0, finest: Finest::default() }
     }
 
     /// The open sea of a state, at a level (m), as deep as the state says.
@@ -93,7 +105,7 @@ impl Sea {
         let mut waves = crate::waves::components::drawn(state, 64, low, 2.0 * peak);
         waves.extend(crate::waves::components::drawn(state, 64, 2.0 * peak, high));
         waves.extend(crate::waves::components::drawn(state, 64, high, 2.5f64.max(1.5 * high)));
-        Ok(sea.with(Box::new(Superposition::new(&waves, state.water())?)))
+        Ok(sea.with(Box::new(Superposition::new(&waves, state.water())?)).with_finest(state, 2.5))
     }
 
     /// The sea of a state over `water` on `land`; `None` for a calm.
@@ -105,7 +117,30 @@ impl Sea {
         waves.extend(crate::waves::components::drawn(state, 64, 2.0 * peak, high));
         waves.extend(crate::waves::components::drawn(state, 64, high, 2.5f64.max(1.5 * high)));
         let sum = Superposition::new(&waves, state.water()).ok()?;
-        Some(Sea::new(datum, water.level).with(Box::new(Sheltered::new(Box::new(sum), shelter(land, water, state)?))))
+        Some(
+            Sea::new(datum, water.level)
+                .with(Box::new(Sheltered::new(Box::new(sum), shelter(land, water, state)?)))
+                .with_finest(state, 2.5),
+        )
+    }
+
+    /// The same with ripples too fine for any model, so that all slopes together are those that C. Cox and W. Munk (1954) saw under the state's
+    /// wind: 0.003 + 0.00508 U, of which the models have those of frequencies up to `highest` (Hz).
+    fn with_finest(mut self, state: &SeaState, highest: f64) -> Sea {
+        let seen = 0.003 + 5.08e-3 * state.wind.speed;
+        let modelled = state.band().map_or(0.0, |(low, _)| {
+            // Slopes are k = (2πf)²/g times heights.
+            libm::pow(std::f64::consts::TAU, 4.0) / (STANDARD_GRAVITY * STANDARD_GRAVITY)
+                * state.moment(4, low, highest)
+        });
+        let left = (seen - modelled).max(0.15 * seen);
+        self.finest = Finest { variance: (0.5 * left) as f32, heading: state.wind.heading };
+        self
+    }
+
+    /// The ripples that are too fine for its models.
+    pub fn finest(&self) -> Finest {
+        self.finest
     }
 
     /// The same with the waves of another model.
@@ -297,7 +332,11 @@ impl Sea {
         Surface {
             height: self.level + f64::from(m.dz[lane]),
             slope: Vec2::new((c * sx - b * sy) / area, (a * sy - b * sx) / area),
-            hidden: Vec3::new(m.hidden_xx[lane], m.hidden_xy[lane], m.hidden_yy[lane]),
+            hidden: Vec3::new(
+                m.hidden_xx[lane] + self.finest.variance,
+                m.hidden_xy[lane],
+                m.hidden_yy[lane] + self.finest.variance,
+            ),
             foam: m.foam[lane],
             rest: DVec2::new(found.rest.x[lane], found.rest.y[lane]),
             residual: found.residual[lane],

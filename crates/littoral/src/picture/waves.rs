@@ -5,6 +5,7 @@
 //! narrower than what a pixel covers are left to the shading, as slopes.
 
 use super::atmosphere::EARTH;
+use super::grain::{grain, resolved};
 use super::sea::Ripples;
 use super::stage::{Lens, Stage};
 use crate::field::Sea;
@@ -177,7 +178,10 @@ impl Stage<'_> {
             let at = DVec2::new(points.x[i], points.y[i]);
             let surface = sea.surface(&found, i);
             let position = at.extend(surface.height - self.drop_at(at));
-            Some(Wet { position, slope: surface.slope, hidden: surface.hidden, foam: surface.foam, rest: surface.rest })
+            let mut wet =
+                Wet { position, slope: surface.slope, hidden: surface.hidden, foam: surface.foam, rest: surface.rest };
+            shiver(sea, &mut wet, points.footprint[i]);
+            Some(wet)
         };
         (0..rays.len()).map(wet).collect()
     }
@@ -202,6 +206,30 @@ impl Stage<'_> {
             lane.offset = DVec2::new(f64::from(motion.dx[i]), f64::from(motion.dy[i]));
         }
         motion.dz.map(f64::from)
+    }
+}
+
+/// Ripples finer than the sea's models hold, as far as a pixel of a footprint (m) shows them: noise that runs with the wind and changes as it runs
+/// (K. Perlin's animated noise on the slopes of the water, as in the module of 1999).
+fn shiver(sea: &Sea, wet: &mut Wet, footprint: f32) {
+    /// Lengths (m), and how fast they run (m/s): gravity and tension together.
+    const RIPPLES: [(f32, f64); 3] = [(0.083, 0.37), (0.037, 0.26), (0.016, 0.23)];
+    /// Mean square slope of the noise, per direction.
+    const NOISE: f32 = 0.5;
+    let finest = sea.finest();
+    let along = DVec2::from_angle(finest.heading);
+    for (i, (wavelength, speed)) in RIPPLES.into_iter().enumerate() {
+        let share = resolved(wavelength, footprint);
+        if share == 0.0 || finest.variance == 0.0 {
+            break;
+        }
+        let turn = DVec2::from_angle(0.6 * i as f64 - 0.5).rotate(along);
+        let place = (wet.rest - turn * speed * sea.time()) / f64::from(wavelength);
+        let seen = grain(place.extend(sea.time() * 0.35 * speed / f64::from(wavelength)), 90 + i as u32).gradient;
+        let variance = finest.variance / RIPPLES.len() as f32;
+        wet.slope += Vec2::new(seen.x, seen.y) * ((variance / NOISE).sqrt() * share);
+        let shown = variance * share * share;
+        wet.hidden -= Vec3::new(shown, 0.0, shown);
     }
 }
 
