@@ -15,18 +15,23 @@ mod fft;
 mod measured;
 mod model;
 pub mod random;
+mod sheltered;
 pub mod spec;
 mod spectrum;
 mod spreading;
 mod state;
+mod sum;
+mod superposition;
 
 pub use components::PlaneWave;
 pub use dispersion::{STANDARD_GRAVITY, SURFACE_TENSION, StillWater};
 pub use measured::{Band, Entropy, Measured};
 pub use model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
+pub use sheltered::{Shelter, Sheltered};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};
 pub use state::{SeaState, Slice, Train, Wind, bearing_from_heading, heading_from_bearing};
+pub use superposition::Superposition;
 
 /// A number that makes no sense where it was given.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
