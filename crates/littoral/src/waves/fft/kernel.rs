@@ -80,7 +80,7 @@ impl Line {
         let (result, scratch) = (&mut result[..n], &mut scratch[..n]);
         // Whichever buffer the first pass fills, the last one fills `result`.
         let (mut full, mut free): (&mut [Wide], &mut [Wide]) =
-            if self.radices.len() % 2 == 0 { (scratch, result) } else { (result, scratch) };
+            if self.radices.len().is_multiple_of(2) { (scratch, result) } else { (result, scratch) };
         if narrow {
             first_narrow(source, at, base, &self.twiddles[0], full);
         } else {
