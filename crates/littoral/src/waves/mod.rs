@@ -8,8 +8,10 @@
 //! time is in seconds. Everything random comes from a seed by counting ([`random`]) and every elementary function from one library in Rust, so
 //! that a sea has the same bits on every platform.
 
+pub mod cascades;
 pub mod components;
 mod dispersion;
+mod fft;
 mod measured;
 mod model;
 pub mod random;
