@@ -120,6 +120,8 @@ pub struct ShoreSea {
     rows: usize,
     apron: [usize; 2],
     components: Vec<Component>,
+    /// Where among them each wave is that was given.
+    seats: Vec<usize>,
     /// The same in sixteens.
     lanes: Vec<WaveLanes>,
     /// How many sixteens.
@@ -137,6 +139,8 @@ pub struct ShoreSea {
     bounds: Bounds,
     /// Largest amplitude (m) of each component by the binary logarithm of its local wavelength, 8 bins from 1 m up.
     by_length: Vec<[f32; BINS]>,
+    /// Scratch: sums of slopes by cell.
+    steepness: Vec<f32>,
     scratch: Scratch,
     sources: Vec<u32>,
     queue: Vec<u32>,
@@ -200,6 +204,7 @@ impl ShoreSea {
             rows: 0,
             apron: [0; 2],
             components: Vec::new(),
+            seats: Vec::new(),
             lanes: Vec::new(),
             blocks: 0,
             records: Vec::new(),
@@ -211,6 +216,7 @@ impl ShoreSea {
             time: 0.0,
             bounds: Bounds::default(),
             by_length: Vec::new(),
+            steepness: Vec::new(),
             scratch: Scratch::default(),
             sources: Vec::new(),
             queue: Vec::new(),
@@ -247,8 +253,13 @@ impl ShoreSea {
         let (frequency, wavenumber) = solve::means(waves);
         self.frequency = frequency as f32;
         self.breaking = settings.breaking;
+        // Kept in the order of the batches, so that what they told is copied in whole runs.
+        self.seats.clear();
+        self.seats.resize(waves.len(), 0);
+        let order = || self.scratch.batches.iter().flat_map(|b| &b.members);
+        order().enumerate().for_each(|(seat, &wave)| self.seats[wave] = seat);
         self.components.clear();
-        self.components.extend(waves.iter().map(|w| Component {
+        self.components.extend(order().map(|&n| &waves[n]).map(|w| Component {
             turns: w.wavenumber / TAU,
             start: w.phase / TAU,
             frequency: w.angular_frequency / TAU,
@@ -258,7 +269,7 @@ impl ShoreSea {
         self.blocks = blocks;
         self.lanes.clear();
         self.lanes.resize(blocks, WaveLanes::NONE);
-        for (n, wave) in waves.iter().enumerate() {
+        for (n, wave) in order().map(|&n| &waves[n]).enumerate() {
             let (lanes, l) = (&mut self.lanes[n / LANES], n % LANES);
             let turns = wave.wavenumber / TAU;
             (lanes.turns_x[l], lanes.turns_y[l]) = (turns.x, turns.y);
@@ -287,25 +298,28 @@ impl ShoreSea {
             *place = ground.place(stretch(grid.s[i]), energy, Some((grid.slope[i], height)));
         });
 
-        // The waves, sorted as they were given, and no higher together than the depth bears.
-        let mut seat = vec![(0usize, 0usize); blocks * LANES];
-        for (b, batch) in batches.iter().enumerate() {
-            for (lane, &member) in batch.members.iter().enumerate() {
-                seat[member] = (b, lane);
-            }
-        }
+        // The waves, no higher together than the depth bears.
         self.records.resize(count * blocks, Record::NONE);
-        let given = waves.len();
         if blocks > 0 {
             self.records.par_chunks_exact_mut(blocks).enumerate().for_each(|(i, records)| {
                 let all = total(i).0;
                 let cap = solve::limit(grid.s[i], rim, settings);
                 let by = if all > cap { (cap / all).sqrt() } else { 1.0 };
-                for (n, &(b, lane)) in seat[..given].iter().enumerate() {
-                    let from = &batches[b].records[i];
-                    let to = &mut records[n / LANES];
-                    to.phase[n % LANES] = from.phase[lane];
-                    to.amplitude[n % LANES] = if by < 1.0 { solve::lowered(from.amplitude[lane], by) } else { from.amplitude[lane] };
+                let mut seat = 0;
+                for batch in batches {
+                    let from = &batch.records[i];
+                    let (block, lane, count) = (seat / LANES, seat % LANES, batch.members.len());
+                    let here = count.min(LANES - lane);
+                    records[block].phase[lane..lane + here].copy_from_slice(&from.phase[..here]);
+                    records[block].amplitude[lane..lane + here].copy_from_slice(&from.amplitude[..here]);
+                    if here < count {
+                        records[block + 1].phase[..count - here].copy_from_slice(&from.phase[here..count]);
+                        records[block + 1].amplitude[..count - here].copy_from_slice(&from.amplitude[here..count]);
+                    }
+                    seat += count;
+                }
+                if by < 1.0 {
+                    records.iter_mut().for_each(|r| r.amplitude.iter_mut().for_each(|a| *a = solve::lowered(*a, by)));
                 }
             });
         }
@@ -414,6 +428,7 @@ impl ShoreSea {
     /// If there is no such wave.
     pub fn component(&self, n: usize, x: f64, y: f64) -> (f64, DVec2) {
         assert!(n < self.components.len(), "expected a wave below {}, got {n}", self.components.len());
+        let n = self.seats[n];
         let ([c, r], [u, v]) = self.locate(x, y);
         let at = |dc: i64, dr: i64| {
             self.node(c.saturating_add(dc), r.saturating_add(dr)).map_or((0, UNITS as u16), |i| {

@@ -21,10 +21,12 @@ pub(super) const STEPS: usize = 512;
 /// How many units the amplitude of the incoming wave has; eight times that is the most that can be told.
 pub(super) const UNITS: f32 = 8192.0;
 
-/// Terms of the fraction for √(1+W) − 1: aₙ = ⅖ sin² (nπ/5), bₙ = cos² (nπ/5).
-const TERMS: [(f32, f32); 2] = [(0.138_196_6, 0.654_508_5), (0.361_803_4, 0.095_491_5)];
-/// Imaginary part of bₙ far from land, and how much more beside it.
-const DAMPING: (f32, f32) = (0.004, 0.2);
+/// Terms of the fraction for √(1+W) − 1: aₙ = ⅖ sin² (nπ/5), bₙ = cos² (nπ/5), and the imaginary part of bₙ far from land. That makes waves
+/// that have turned by 30° from where Snell's law would have them lose 0.3 % of their amplitude in a wavelength, and by 45° 1.4 %; with less,
+/// those that should not run at all cross the whole grid.
+const TERMS: [(f32, f32, f32); 2] = [(0.138_196_6, 0.654_508_5, 0.02), (0.361_803_4, 0.095_491_5, 0.008)];
+/// How much more of it beside land.
+const BESIDE_LAND: f32 = 0.2;
 
 /// What waves of a batch are at a node, relative to themselves in the open: phase (2⁻¹⁶ turns) and amplitude (1/[`UNITS`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,6 +147,7 @@ pub(super) fn settle(march: &mut March, waves: &Waves, row: &[Node], share: f32)
     let n = row.len();
     let b = &mut march.b[..n];
     let (whole, records, told) = (&mut march.whole[..n], &mut march.records[..n], &mut march.told[..n]);
+    let (finest, across, open_flux, open_energy) = (waves.finest, waves.across, waves.flux, waves.energy);
     for j in 0..n {
         let node = row[j];
         if node.near > 1.0 {
@@ -154,22 +157,23 @@ pub(super) fn settle(march: &mut March, waves: &Waves, row: &[Node], share: f32)
             continue;
         }
         let (index, f) = entry(node.s);
-        let (low, high) = (&waves.table[index], &waves.table[index + 1]);
+        let (low, high) = (waves.table[index], waves.table[index + 1]);
         let inverse = 1.0 / node.s;
+        let mut z = b[j];
         let (mut re, mut im) = ([0.0f32; LANES], [0.0f32; LANES]);
         let (mut energies, mut fluxes) = ([0.0f32; LANES], [0.0f32; LANES]);
-        let z = &mut b[j];
         for l in 0..LANES {
-            let k = (f.mul_add(high[0].0[l] - low[0].0[l], low[0].0[l]) * inverse).min(waves.finest.0[l]);
+            let k = (f.mul_add(high[0].0[l] - low[0].0[l], low[0].0[l]) * inverse).min(finest.0[l]);
             let speed = f.mul_add(high[1].0[l] - low[1].0[l], low[1].0[l]);
-            let q = waves.across.0[l];
+            let q = across.0[l];
             let p = k.mul_add(k, -(q * q)).max(0.02 * k * k).sqrt();
             // Amplitude of this flux at this speed.
-            let factor = (waves.flux.0[l] * k / (speed * p)).sqrt();
+            let square = open_flux.0[l] * k / (speed * p);
+            let factor = square.sqrt();
             (re[l], im[l]) = (z.re[l] * factor, z.im[l] * factor);
-            let flux = z.re[l].mul_add(z.re[l], z.im[l] * z.im[l]);
-            energies[l] = flux * factor * factor * waves.energy.0[l];
-            fluxes[l] = flux * waves.energy.0[l];
+            let flux = z.re[l].mul_add(z.re[l], z.im[l] * z.im[l]) * open_energy.0[l];
+            energies[l] = flux * square;
+            fluxes[l] = flux;
         }
         let (energy, flux) = (sum(&energies), sum(&fluxes));
         let all = energy.mul_add(share, node.others);
@@ -180,23 +184,34 @@ pub(super) fn settle(march: &mut March, waves: &Waves, row: &[Node], share: f32)
                 z.re[l] *= lower;
                 z.im[l] *= lower;
             }
+            b[j] = z;
         }
         told[j] = Told { energy: energy * lower * lower, unbroken: flux / whole[j].max(1e-4) };
         whole[j] *= lower * lower;
         // Towards the rim the open sea takes over, by energy: waves that are out of step with it must not cancel it.
         let (c, o) = ((1.0 - node.open) * lower, node.open);
-        let record = &mut records[j];
+        let (mut amplitude, mut phase) = ([0i32; LANES], [0i32; LANES]);
         for l in 0..LANES {
             let (x, y) = (re[l].mul_add(c, o), im[l] * c);
             let length = x.mul_add(x, y * y).sqrt();
             let own = re[l].mul_add(re[l], im[l] * im[l]) * lower * lower;
             let wanted = own.mul_add(1.0 - o, o).sqrt();
             let told = if o > 0.0 { wanted.min(2.0 * length) } else { length };
-            let units = told.mul_add(UNITS, 0.5).min(65_535.0);
-            record.amplitude[l] = units as i32 as u16;
-            record.phase[l] = (angle(x, y).mul_add(65_536.0, 32_768.5) as i32 - 32_768) as i16;
+            amplitude[l] = whole_number((told * UNITS).min(65_535.0));
+            phase[l] = whole_number(angle(x, y) * 65_536.0);
+        }
+        let record = &mut records[j];
+        for l in 0..LANES {
+            record.amplitude[l] = amplitude[l] as u16;
+            record.phase[l] = phase[l] as i16;
         }
     }
+}
+
+/// The nearest whole number, for magnitudes below 2²²: its bits stand at the end of the sum's.
+#[inline(always)]
+fn whole_number(x: f32) -> i32 {
+    ((x + 12_582_912.0).to_bits() as i32).wrapping_sub(0x4B40_0000)
 }
 
 /// Sum of sixteen numbers, in a fixed order that suits wide registers.
@@ -217,39 +232,51 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
     let (b, p, v) = (&mut march.b[..n], &mut march.p[..n], &mut march.v[..n]);
     let (g, inverse) = (&mut march.g[..n], &mut march.inverse[..n]);
     let steep = 1.0 / (apart * apart);
+    let (across, finest) = (waves.across, waves.finest);
+    let mut drift = Lanes::ZERO;
+    for l in 0..LANES {
+        drift.0[l] = across.0[l] / apart;
+    }
     for j in 0..n {
         let (index, f) = entry(row[j].s);
         let (low, high) = (&waves.table[index], &waves.table[index + 1]);
         let over = 1.0 / row[j].s;
+        // Copies, here and below, let the compiler see that nothing overlaps.
+        let (low, high, from) = (low[0], high[0], b[j]);
+        let (mut to_p, mut to_v) = (Lanes::ZERO, Complex::ZERO);
         for l in 0..LANES {
-            let k = (f.mul_add(high[0].0[l] - low[0].0[l], low[0].0[l]) * over).min(waves.finest.0[l]);
-            let q = waves.across.0[l];
+            let k = (f.mul_add(high.0[l] - low.0[l], low.0[l]) * over).min(finest.0[l]);
+            let q = across.0[l];
             let along = k.mul_add(k, -(q * q)).max(0.02 * k * k).sqrt();
-            p[j].0[l] = along;
+            to_p.0[l] = along;
             let weight = 1.0 / (along * along.sqrt());
-            v[j].re[l] = b[j].re[l] * weight;
-            v[j].im[l] = b[j].im[l] * weight;
+            to_v.re[l] = from.re[l] * weight;
+            to_v.im[l] = from.im[l] * weight;
         }
+        (p[j], v[j]) = (to_p, to_v);
     }
-    for (a, bn) in TERMS {
+    for (a, bn, least) in TERMS {
         let d = 0.5 * a * forward;
         // Right-hand side: p²v + Z (q⁺ v), with Z the second difference and the drift across.
         // q⁺ v goes into g first.
         for j in 0..n {
-            let damping = row[j].near.min(1.0).mul_add(DAMPING.1, DAMPING.0);
+            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
+            let (pj, vj) = (p[j], v[j]);
+            let mut to = Complex::ZERO;
             for l in 0..LANES {
-                let i = d.mul_add(p[j].0[l], -damping);
-                let (re, im) = (v[j].re[l], v[j].im[l]);
-                g[j].re[l] = bn.mul_add(re, -(i * im));
-                g[j].im[l] = bn.mul_add(im, i * re);
+                let i = d.mul_add(pj.0[l], -damping);
+                let (re, im) = (vj.re[l], vj.im[l]);
+                to.re[l] = bn.mul_add(re, -(i * im));
+                to.im[l] = bn.mul_add(im, i * re);
             }
+            g[j] = to;
         }
         // Forward elimination; at the ends are the waves of the open sea, which do not change.
         let mut last = Complex::ZERO;
         let mut chain = Complex::ZERO;
         let ends = [0, n - 1].map(|j| {
             let mut end = Complex::ZERO;
-            let damping = row[j].near.min(1.0).mul_add(DAMPING.1, DAMPING.0);
+            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
             for l in 0..LANES {
                 let i = -d.mul_add(p[j].0[l], damping);
                 let (re, im) = (v[j].re[l], v[j].im[l]);
@@ -261,55 +288,59 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
         last = if n > 1 { ends[0] } else { last };
         let mut before = g[0];
         for j in 1..n - 1 {
-            let damping = row[j].near.min(1.0).mul_add(DAMPING.1, DAMPING.0);
-            let after = g[j + 1];
-            let here = g[j];
+            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
+            let (after, here) = (g[j + 1], g[j]);
+            let (pj, vj) = (p[j], v[j]);
+            let (mut to_chain, mut to) = (Complex::ZERO, Complex::ZERO);
             for l in 0..LANES {
-                let drift = waves.across.0[l] / apart;
-                let square = p[j].0[l] * p[j].0[l];
+                let drift = drift.0[l];
+                let square = pj.0[l] * pj.0[l];
                 // z± = steep ± i drift
                 let (sr, si) = (before.re[l] + after.re[l], before.im[l] + after.im[l]);
                 let (tr, ti) = (after.re[l] - before.re[l], after.im[l] - before.im[l]);
-                let right_re = steep.mul_add(sr - 2.0 * here.re[l], square.mul_add(v[j].re[l], -(drift * ti)));
-                let right_im = steep.mul_add(si - 2.0 * here.im[l], square.mul_add(v[j].im[l], drift * tr));
+                let right_re = steep.mul_add(sr - 2.0 * here.re[l], square.mul_add(vj.re[l], -(drift * ti)));
+                let right_im = steep.mul_add(si - 2.0 * here.im[l], square.mul_add(vj.im[l], drift * tr));
                 // Diagonal: p²/q⁻ − 2 steep, q⁻ = bₙ − i (δ + d p).
-                let i = -d.mul_add(p[j].0[l], damping);
+                let i = -d.mul_add(pj.0[l], damping);
                 let size = square / bn.mul_add(bn, i * i);
                 let zz = steep.mul_add(steep, drift * drift);
                 let den_re = size.mul_add(bn, -2.0 * steep) - zz * chain.re[l];
                 let den_im = -(size * i) - zz * chain.im[l];
                 let over = 1.0 / den_re.mul_add(den_re, den_im * den_im);
                 let (cr, ci) = (den_re * over, -(den_im * over));
-                chain.re[l] = cr;
-                chain.im[l] = ci;
+                to_chain.re[l] = cr;
+                to_chain.im[l] = ci;
                 // (right − z⁻ last) chain
                 let xr = right_re - steep.mul_add(last.re[l], drift * last.im[l]);
                 let xi = right_im - steep.mul_add(last.im[l], -(drift * last.re[l]));
-                last.re[l] = xr.mul_add(cr, -(xi * ci));
-                last.im[l] = xr.mul_add(ci, xi * cr);
+                to.re[l] = xr.mul_add(cr, -(xi * ci));
+                to.im[l] = xr.mul_add(ci, xi * cr);
             }
-            before = here;
+            (chain, last, before) = (to_chain, to, here);
             inverse[j] = chain;
             g[j] = last;
         }
         // Back substitution, and v from what was solved for.
         let mut next = ends[1];
         for j in (1..n - 1).rev() {
-            let damping = row[j].near.min(1.0).mul_add(DAMPING.1, DAMPING.0);
+            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
+            let (inverse, gj, pj) = (inverse[j], g[j], p[j]);
+            let (mut to, mut to_v) = (Complex::ZERO, Complex::ZERO);
             for l in 0..LANES {
-                let drift = waves.across.0[l] / apart;
-                let (cr, ci) = (inverse[j].re[l], inverse[j].im[l]);
+                let drift = drift.0[l];
+                let (cr, ci) = (inverse.re[l], inverse.im[l]);
                 let yr = steep.mul_add(next.re[l], -(drift * next.im[l]));
                 let yi = steep.mul_add(next.im[l], drift * next.re[l]);
-                let xr = g[j].re[l] - yr.mul_add(cr, -(yi * ci));
-                let xi = g[j].im[l] - yr.mul_add(ci, yi * cr);
-                next.re[l] = xr;
-                next.im[l] = xi;
-                let i = -d.mul_add(p[j].0[l], damping);
+                let xr = gj.re[l] - yr.mul_add(cr, -(yi * ci));
+                let xi = gj.im[l] - yr.mul_add(ci, yi * cr);
+                to.re[l] = xr;
+                to.im[l] = xi;
+                let i = -d.mul_add(pj.0[l], damping);
                 let over = 1.0 / bn.mul_add(bn, i * i);
-                v[j].re[l] = xr.mul_add(bn, xi * i) * over;
-                v[j].im[l] = xi.mul_add(bn, -(xr * i)) * over;
+                to_v.re[l] = xr.mul_add(bn, xi * i) * over;
+                to_v.im[l] = xi.mul_add(bn, -(xr * i)) * over;
             }
+            (next, v[j]) = (to, to_v);
         }
     }
     for j in 0..n {
@@ -317,16 +348,22 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
         let keep = if land { 0.0 } else { 1.0 - row[j].draw };
         let gain = if land { 0.0 } else { row[j].draw };
         let end = j == 0 || j == n - 1;
-        for l in 0..LANES {
-            let along = p[j].0[l];
-            let weight = along * along.sqrt() * keep;
-            let turns = (along - waves.along.0[l]) * forward * 0.159_154_94;
-            let (s, c) = sine_cosine(turns);
-            let (re, im) = (v[j].re[l] * weight, v[j].im[l] * weight);
-            let (re, im) = (re.mul_add(c, -(im * s)) + gain, re.mul_add(s, im * c));
-            b[j].re[l] = if end { 1.0 } else { re };
-            b[j].im[l] = if end { 0.0 } else { im };
+        if end {
+            b[j] = Complex::ONE;
+            continue;
         }
+        let (pj, vj, open) = (p[j], v[j], waves.along);
+        let mut to = Complex::ZERO;
+        for l in 0..LANES {
+            let along = pj.0[l];
+            let weight = along * along.sqrt() * keep;
+            let turns = (along - open.0[l]) * forward * 0.159_154_94;
+            let (s, c) = sine_cosine(turns);
+            let (re, im) = (vj.re[l] * weight, vj.im[l] * weight);
+            to.re[l] = re.mul_add(c, -(im * s)) + gain;
+            to.im[l] = re.mul_add(s, im * c);
+        }
+        b[j] = to;
     }
     // What has not broken spreads a little, as the waves do.
     let whole = &mut march.whole[..n];

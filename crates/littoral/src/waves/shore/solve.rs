@@ -7,7 +7,7 @@
 use super::super::{OutOfRange, PlaneWave, StillWater};
 use super::bed::Bed;
 use super::lanes::LANES;
-use super::march::{self, March, Node, Record, STEPS, Told, UNITS, Waves};
+use super::march::{self, March, Node, Record, STEPS, Told, Waves};
 use super::{Cancelled, Settings, ShoreError};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -487,6 +487,3 @@ impl Batch {
 pub(super) fn lowered(amplitude: u16, by: f32) -> u16 {
     (f32::from(amplitude) * by + 0.5) as u16
 }
-
-/// The amplitude of an incoming wave in units.
-pub(super) const WHOLE: f32 = UNITS;
