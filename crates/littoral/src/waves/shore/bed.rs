@@ -140,6 +140,23 @@ impl Bed {
         self.rows
     }
 
+    /// Mean depth (m) of the water along the border of the grid, or of all of it where the border is dry: what suits as the depth of the
+    /// sea off the bed, so that waves come to it unbent.
+    pub fn edge_depth(&self) -> f64 {
+        let mean = |wanted: &dyn Fn(usize) -> bool| {
+            let wet = |&i: &usize| self.depths[i] > 0.0 && wanted(i);
+            let (sum, count) = (0..self.depths.len())
+                .filter(wet)
+                .fold((0.0, 0usize), |(s, n), i| (s + f64::from(self.depths[i]), n + 1));
+            (count > 0).then(|| sum / count as f64)
+        };
+        let border = |i: usize| {
+            let (c, r) = (i % self.columns, i / self.columns);
+            c == 0 || r == 0 || c == self.columns - 1 || r == self.rows - 1
+        };
+        mean(&border).or_else(|| mean(&|_| true)).unwrap_or(1.0)
+    }
+
     /// Depths (m), row by row from the south; at most 0 on land. Never NaN.
     pub fn depths(&self) -> &[f32] {
         &self.depths
