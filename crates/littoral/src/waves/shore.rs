@@ -116,6 +116,8 @@ impl WaveLanes {
 pub struct ShoreSea {
     origin: DVec2,
     spacing: DVec2,
+    /// One over the spacing.
+    over: DVec2,
     columns: usize,
     rows: usize,
     apron: [usize; 2],
@@ -126,8 +128,9 @@ pub struct ShoreSea {
     lanes: Vec<WaveLanes>,
     /// How many sixteens.
     blocks: usize,
-    /// By node, then by block.
+    /// By node, then by block; after the last node comes the open sea.
     records: Vec<Record>,
+    /// By node, and the open sea.
     places: Vec<Place>,
     /// The place of everything outside the grid.
     open: Place,
@@ -143,7 +146,6 @@ pub struct ShoreSea {
     steepness: Vec<f32>,
     scratch: Scratch,
     sources: Vec<u32>,
-    queue: Vec<u32>,
 }
 
 /// Bins of wavelengths, each an octave; the first is all below 1 m.
@@ -200,6 +202,7 @@ impl ShoreSea {
         let mut sea = ShoreSea {
             origin: DVec2::ZERO,
             spacing: DVec2::ONE,
+            over: DVec2::ONE,
             columns: 0,
             rows: 0,
             apron: [0; 2],
@@ -219,7 +222,6 @@ impl ShoreSea {
             steepness: Vec::new(),
             scratch: Scratch::default(),
             sources: Vec::new(),
-            queue: Vec::new(),
         };
         sea.solve(bed, waves, depth, settings, progress)?;
         Ok(sea)
@@ -248,6 +250,7 @@ impl ShoreSea {
     fn take(&mut self, waves: &[PlaneWave], depth: f64, settings: &Settings) {
         let grid = &self.scratch.grid;
         (self.origin, self.spacing) = (grid.origin, grid.spacing);
+        self.over = self.spacing.recip();
         (self.columns, self.rows, self.apron) = (grid.columns, grid.rows, grid.apron);
         let count = grid.columns * grid.rows;
         let (frequency, wavenumber) = solve::means(waves);
@@ -290,8 +293,8 @@ impl ShoreSea {
         let batches = &self.scratch.batches;
         let total = |i: usize| batches.iter().fold((0.0f32, 0.0f32), |(e, u), b| (e + b.told[i].energy, u + b.told[i].unbroken));
         self.places.clear();
-        self.places.resize(count, Place::default());
-        self.places.par_iter_mut().enumerate().for_each(|(i, place)| {
+        self.places.resize(count + 1, self.open);
+        self.places[..count].par_iter_mut().enumerate().for_each(|(i, place)| {
             let (energy, unbroken) = total(i);
             let energy = energy.min(solve::limit(grid.s[i], rim, settings));
             let height = 4.0 * unbroken.max(0.0).sqrt();
@@ -299,9 +302,10 @@ impl ShoreSea {
         });
 
         // The waves, no higher together than the depth bears.
-        self.records.resize(count * blocks, Record::NONE);
+        self.records.resize((count + 1) * blocks, Record::NONE);
+        self.records[count * blocks..].fill(Record::OPEN);
         if blocks > 0 {
-            self.records.par_chunks_exact_mut(blocks).enumerate().for_each(|(i, records)| {
+            self.records[..count * blocks].par_chunks_exact_mut(blocks).enumerate().for_each(|(i, records)| {
                 let all = total(i).0;
                 let cap = solve::limit(grid.s[i], rim, settings);
                 let by = if all > cap { (cap / all).sqrt() } else { 1.0 };
@@ -334,10 +338,9 @@ impl ShoreSea {
         let (columns, rows) = (self.columns, self.rows);
         let rings = (REACH / self.spacing.min_element()).ceil().clamp(2.0, 40.0) as usize;
         const NONE: u32 = u32::MAX;
-        let (sources, queue) = (&mut self.sources, &mut self.queue);
+        let sources = &mut self.sources;
         sources.clear();
         sources.extend((0..columns * rows).map(|i| if grid.near[i] > 1.0 { NONE } else { i as u32 }));
-        queue.clear();
         let spacing = self.spacing;
         let away = |i: usize, source: u32| {
             let s = source as usize;
@@ -347,8 +350,7 @@ impl ShoreSea {
         };
         let mut front: Vec<u32> = (0..columns * rows).filter(|&i| sources[i] == NONE).map(|i| i as u32).collect();
         for _ in 0..rings {
-            // Found in one ring, so that the order within it does not matter.
-            queue.clear();
+            // Found ring by ring, so that the order within one does not matter.
             let found: Vec<(u32, u32)> = front
                 .iter()
                 .filter_map(|&i| {
@@ -387,16 +389,14 @@ impl ShoreSea {
     }
 
     /// Where on the grid a place lies: column and row of the node below it (which may lie off the grid), and how far on to the next.
-    #[inline(always)]
     fn locate(&self, x: f64, y: f64) -> ([i64; 2], [f32; 2]) {
-        let (u, v) = ((x - self.origin.x) / self.spacing.x, (y - self.origin.y) / self.spacing.y);
+        let (u, v) = ((x - self.origin.x) * self.over.x, (y - self.origin.y) * self.over.y);
         let (c, r) = (u.floor(), v.floor());
         // A place that is no number is taken as the first node.
         ([c as i64, r as i64], [(u - c).max(0.0).min(1.0) as f32, (v - r).max(0.0).min(1.0) as f32])
     }
 
     /// Index of a node, if it lies on the grid.
-    #[inline(always)]
     fn node(&self, column: i64, row: i64) -> Option<usize> {
         let inside = column >= 0 && row >= 0 && (column as u64) < self.columns as u64 && (row as u64) < self.rows as u64;
         inside.then(|| row as usize * self.columns + column as usize)

@@ -107,6 +107,8 @@ pub(super) struct March {
     v: Vec<Complex>,
     g: Vec<Complex>,
     inverse: Vec<Complex>,
+    part: Vec<Lanes>,
+    root: Vec<Lanes>,
     pub(super) records: Vec<Record>,
     pub(super) told: Vec<Told>,
 }
@@ -114,7 +116,7 @@ pub(super) struct March {
 impl March {
     /// Starts with the waves of the open sea on a row of `nodes`.
     pub(super) fn start(&mut self, nodes: usize) {
-        let March { b, whole, p, v, g, inverse, records, told } = self;
+        let March { b, whole, p, v, g, inverse, part, root, records, told } = self;
         for (list, value) in
             [(b, Complex::ONE), (v, Complex::ZERO), (g, Complex::ZERO), (inverse, Complex::ZERO)]
         {
@@ -123,8 +125,10 @@ impl March {
         }
         whole.clear();
         whole.resize(nodes, 1.0);
-        p.clear();
-        p.resize(nodes, Lanes::ONE);
+        for list in [p, part, root] {
+            list.clear();
+            list.resize(nodes, Lanes::ONE);
+        }
         records.clear();
         records.resize(nodes, Record::NONE);
         told.clear();
@@ -231,6 +235,7 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
     let n = row.len();
     let (b, p, v) = (&mut march.b[..n], &mut march.p[..n], &mut march.v[..n]);
     let (g, inverse) = (&mut march.g[..n], &mut march.inverse[..n]);
+    let (part, root) = (&mut march.part[..n], &mut march.root[..n]);
     let steep = 1.0 / (apart * apart);
     let (across, finest) = (waves.across, waves.finest);
     let mut drift = Lanes::ZERO;
@@ -243,17 +248,19 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
         let over = 1.0 / row[j].s;
         // Copies, here and below, let the compiler see that nothing overlaps.
         let (low, high, from) = (low[0], high[0], b[j]);
-        let (mut to_p, mut to_v) = (Lanes::ZERO, Complex::ZERO);
+        let (mut to_p, mut to_root, mut to_v) = (Lanes::ZERO, Lanes::ZERO, Complex::ZERO);
         for l in 0..LANES {
             let k = (f.mul_add(high.0[l] - low.0[l], low.0[l]) * over).min(finest.0[l]);
             let q = across.0[l];
             let along = k.mul_add(k, -(q * q)).max(0.02 * k * k).sqrt();
             to_p.0[l] = along;
-            let weight = 1.0 / (along * along.sqrt());
+            let power = along * along.sqrt();
+            to_root.0[l] = power;
+            let weight = 1.0 / power;
             to_v.re[l] = from.re[l] * weight;
             to_v.im[l] = from.im[l] * weight;
         }
-        (p[j], v[j]) = (to_p, to_v);
+        (p[j], root[j], v[j]) = (to_p, to_root, to_v);
     }
     for (a, bn, least) in TERMS {
         let d = 0.5 * a * forward;
@@ -291,7 +298,7 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
             let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
             let (after, here) = (g[j + 1], g[j]);
             let (pj, vj) = (p[j], v[j]);
-            let (mut to_chain, mut to) = (Complex::ZERO, Complex::ZERO);
+            let (mut to_chain, mut to, mut to_part) = (Complex::ZERO, Complex::ZERO, Lanes::ZERO);
             for l in 0..LANES {
                 let drift = drift.0[l];
                 let square = pj.0[l] * pj.0[l];
@@ -302,7 +309,9 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
                 let right_im = steep.mul_add(si - 2.0 * here.im[l], square.mul_add(vj.im[l], drift * tr));
                 // Diagonal: p²/q⁻ − 2 steep, q⁻ = bₙ − i (δ + d p).
                 let i = -d.mul_add(pj.0[l], damping);
-                let size = square / bn.mul_add(bn, i * i);
+                let part = 1.0 / bn.mul_add(bn, i * i);
+                to_part.0[l] = part;
+                let size = square * part;
                 let zz = steep.mul_add(steep, drift * drift);
                 let den_re = size.mul_add(bn, -2.0 * steep) - zz * chain.re[l];
                 let den_im = -(size * i) - zz * chain.im[l];
@@ -318,13 +327,14 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
             }
             (chain, last, before) = (to_chain, to, here);
             inverse[j] = chain;
+            part[j] = to_part;
             g[j] = last;
         }
         // Back substitution, and v from what was solved for.
         let mut next = ends[1];
         for j in (1..n - 1).rev() {
             let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            let (inverse, gj, pj) = (inverse[j], g[j], p[j]);
+            let (inverse, gj, pj, part) = (inverse[j], g[j], p[j], part[j]);
             let (mut to, mut to_v) = (Complex::ZERO, Complex::ZERO);
             for l in 0..LANES {
                 let drift = drift.0[l];
@@ -336,9 +346,8 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
                 to.re[l] = xr;
                 to.im[l] = xi;
                 let i = -d.mul_add(pj.0[l], damping);
-                let over = 1.0 / bn.mul_add(bn, i * i);
-                to_v.re[l] = xr.mul_add(bn, xi * i) * over;
-                to_v.im[l] = xi.mul_add(bn, -(xr * i)) * over;
+                to_v.re[l] = xr.mul_add(bn, xi * i) * part.0[l];
+                to_v.im[l] = xi.mul_add(bn, -(xr * i)) * part.0[l];
             }
             (next, v[j]) = (to, to_v);
         }
@@ -352,11 +361,11 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
             b[j] = Complex::ONE;
             continue;
         }
-        let (pj, vj, open) = (p[j], v[j], waves.along);
+        let (pj, vj, power, open) = (p[j], v[j], root[j], waves.along);
         let mut to = Complex::ZERO;
         for l in 0..LANES {
             let along = pj.0[l];
-            let weight = along * along.sqrt() * keep;
+            let weight = power.0[l] * keep;
             let turns = (along - open.0[l]) * forward * 0.159_154_94;
             let (s, c) = sine_cosine(turns);
             let (re, im) = (vj.re[l] * weight, vj.im[l] * weight);

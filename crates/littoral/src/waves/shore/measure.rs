@@ -31,7 +31,7 @@ impl Most {
 }
 
 /// Most that water may be stretched sideways: 1 would make the first loop.
-const STRETCH: f32 = 0.85;
+const STRETCH: f32 = 0.75;
 
 /// Finds the bounds of a sea, after lowering its sideways motion to where no loop can form.
 pub(super) fn measure(sea: &mut ShoreSea) {
@@ -42,6 +42,7 @@ pub(super) fn measure(sea: &mut ShoreSea) {
     steepness.resize(columns * rows, 0.0);
     steepness.par_chunks_exact_mut(columns).enumerate().for_each(|(row, out)| steepnesses(sea, row, out));
     tame(sea, &steepness);
+    sea.places[(columns - 1) * (rows - 1)] = sea.open;
     sea.steepness = steepness;
     let most = (0..rows)
         .into_par_iter()
@@ -73,7 +74,7 @@ fn tame(sea: &mut ShoreSea, steepness: &[f32]) {
     let rim = steepness[0].max(steepness[wide * (rows + 1) - 1]);
     sea.open.0[n] = sea.open.0[n].min(STRETCH / rim.max(STRETCH));
     let (slow_x, slow_y) = {
-        let most = 0.1 / height.max(0.1);
+        let most = 0.04 / height.max(0.04);
         (most * sea.spacing.x as f32, most * sea.spacing.y as f32)
     };
     let open = sea.open.0[n];

@@ -171,27 +171,38 @@ fn read(table: &[f32], at: f32) -> f32 {
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Sums {
-    /// ζ, ξ, and the sideways motion of deep water.
-    pub(super) values: [[f32; LANES]; 4],
-    /// Their derivatives along x.
-    pub(super) along_x: [[f32; LANES]; 4],
-    /// And along y.
-    pub(super) along_y: [[f32; LANES]; 4],
+    /// Σ A cos θ, with its derivatives along x and y.
+    pub(super) zeta: [f32; LANES],
+    pub(super) zeta_x: [f32; LANES],
+    pub(super) zeta_y: [f32; LANES],
+    /// Σ A sin θ, with its derivatives.
+    pub(super) xi: [f32; LANES],
+    pub(super) xi_x: [f32; LANES],
+    pub(super) xi_y: [f32; LANES],
+    /// Σ A sin θ times the directions, which is against the sideways motion of deep water; and its derivatives xx, xy, yy.
+    pub(super) side_x: [f32; LANES],
+    pub(super) side_y: [f32; LANES],
+    pub(super) stretch: [[f32; LANES]; 3],
     /// Covariances of the slopes left out.
     pub(super) hidden: [[f32; LANES]; 3],
     /// The places.
     pub(super) place: [[f32; LANES]; 8],
-    /// Their derivatives along x (the first five).
+    /// Derivatives along x and y of their height, profile and sideways motion.
     pub(super) place_x: [[f32; LANES]; 8],
-    /// And along y.
     pub(super) place_y: [[f32; LANES]; 8],
 }
 
 impl Sums {
     pub(super) const NONE: Sums = Sums {
-        values: [[0.0; LANES]; 4],
-        along_x: [[0.0; LANES]; 4],
-        along_y: [[0.0; LANES]; 4],
+        zeta: [0.0; LANES],
+        zeta_x: [0.0; LANES],
+        zeta_y: [0.0; LANES],
+        xi: [0.0; LANES],
+        xi_x: [0.0; LANES],
+        xi_y: [0.0; LANES],
+        side_x: [0.0; LANES],
+        side_y: [0.0; LANES],
+        stretch: [[0.0; LANES]; 3],
         hidden: [[0.0; LANES]; 3],
         place: [[0.0; LANES]; 8],
         place_x: [[0.0; LANES]; 8],
@@ -202,7 +213,7 @@ impl Sums {
 /// Height of the profile at lane `l`, and the parts it is made of: numerator, denominator, E.
 #[inline(always)]
 pub(super) fn profile(sums: &Sums, l: usize) -> (f32, f32, f32, f32, f32, f32) {
-    let (zeta, xi) = (sums.values[0][l], sums.values[1][l]);
+    let (zeta, xi) = (sums.zeta[l], sums.xi[l]);
     let (rc, rs) = (sums.place[Place::COSINE][l], sums.place[Place::SINE][l]);
     let soft = SOFT * sums.place[Place::HEIGHT][l];
     let e = soft.mul_add(soft, zeta.mul_add(zeta, xi.mul_add(xi, 1e-12))).sqrt();
@@ -214,19 +225,18 @@ pub(super) fn profile(sums: &Sums, l: usize) -> (f32, f32, f32, f32, f32, f32) {
     (f * numerator / denominator, numerator, denominator, e, f, lean)
 }
 
-/// Slope of the profile at lane `l`, given the derivatives along one axis.
+/// Slope of the profile at lane `l`, given the derivatives of ζ, ξ and the places along one axis.
 #[inline(always)]
 pub(super) fn profile_slope(
     sums: &Sums,
     l: usize,
     parts: (f32, f32, f32, f32, f32, f32),
-    along: &[[f32; LANES]; 4],
+    (zeta_d, xi_d): (f32, f32),
     place: &[[f32; LANES]; 8],
 ) -> f32 {
     let (_, numerator, denominator, e, f, lean) = parts;
-    let (zeta, xi) = (sums.values[0][l], sums.values[1][l]);
+    let (zeta, xi) = (sums.zeta[l], sums.xi[l]);
     let (rc, rs) = (sums.place[Place::COSINE][l], sums.place[Place::SINE][l]);
-    let (zeta_d, xi_d) = (along[0][l], along[1][l]);
     let (rc_d, rs_d) = (place[Place::COSINE][l], place[Place::SINE][l]);
     let soft = SOFT * SOFT * sums.place[Place::HEIGHT][l] * place[Place::HEIGHT][l];
     let e_d = (zeta * zeta_d + xi * xi_d + soft) / e;
@@ -308,7 +318,7 @@ impl Lace {
         if broken < 2e-3 {
             return 0.0;
         }
-        let (zeta, xi) = (sums.values[0][l], sums.values[1][l]);
+        let (zeta, xi) = (sums.zeta[l], sums.xi[l]);
         let most = breaking * sums.place[Place::DEPTH][l];
         let e = zeta.mul_add(zeta, xi * xi).sqrt();
         let often = smooth(2e-3, 0.05, broken);
