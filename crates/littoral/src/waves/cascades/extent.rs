@@ -107,7 +107,7 @@ impl Patch {
         // A little more than rounding can add.
         let [height, sideways, slope, stretch, curvature] =
             most.map(|lane| lane.iter().fold(0.0, |a: f32, b| a.max(*b)) * 1.000_01);
-        Bounds { height, sideways, slope, stretch, curvature }
+        Bounds { height, sideways, slope, stretch, curvature, bend: f32::INFINITY }
     }
 
     /// Variance that is to be expected of heights, or of sideways displacements if that is more, of waves shorter than a length (m).
