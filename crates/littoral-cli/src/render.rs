@@ -230,7 +230,7 @@ impl Render {
             ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
         };
         let stage = Stage::new(&scene);
-        let mut sea = self.waves(&subject, talk);
+        let mut sea = self.waves(&subject, talk)?;
         let settings = Settings { samples: self.samples, seed: self.seed };
         if let Some(film) = film {
             return film.run(&subject, &stage, sea.as_mut(), &settings, started, talk);
@@ -278,23 +278,33 @@ impl Render {
     }
 
     /// The waves on the subject's water at the first instant.
-    fn waves(&self, subject: &Subject, talk: &mut Talk) -> Option<Sea> {
+    fn waves(&self, subject: &Subject, talk: &mut Talk) -> Result<Option<Sea>, Failure> {
         let state = match &self.sea {
             Some(state) => state.clone(),
             None if self.files.is_empty() => coast::sea_state(),
-            None => return None,
+            None => return Ok(None),
         };
         let Some(water) = &subject.water else {
             if self.sea.is_some() {
                 talk.warn(format!("{}: no water for --sea; --water METRES says how high it stands", subject.name));
             }
-            return None;
+            return Ok(None);
         };
         // Bearings count from true north, headings from the land's x axis.
         let state = state.turned(-subject.frame.north());
-        let mut sea = Sea::over(&subject.land, water, &state)?;
+        if state.trains.is_empty() {
+            return Ok(None);
+        }
+        let bar = progress(1000, "carrying the waves over the bed");
+        let told = |done: f64| {
+            bar.set_position((done * 1000.0) as u64);
+            true
+        };
+        let made = Sea::over(&subject.land, water, &state, &told);
+        bar.finish_and_clear();
+        let mut sea = made.map_err(|e| Failure::Work(format!("{}: {e}", subject.name)))?;
         sea.set_time(self.time);
-        Some(sea)
+        Ok(Some(sea))
     }
 
     /// The film that is wanted, if one is.

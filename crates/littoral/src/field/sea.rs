@@ -7,12 +7,11 @@
 //!
 //! One function serves pictures, queries and meshes, so that a boat floats on the water that is seen.
 
+mod build;
+
 use super::{HeightField, HeightRange, Land, Water};
 use crate::space::{Cell, Datum, Place};
-use crate::waves::{
-    BLOCK, Bounds, Motion, OutOfRange, Points, STANDARD_GRAVITY, SeaState, Shelter, Sheltered, Superposition, Velocity,
-    WaveModel,
-};
+use crate::waves::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -93,49 +92,6 @@ impl Sea {
     /// Still water at a level (m), to which models of waves may be added, over a datum, which must be a plane.
     pub fn new(datum: Datum, level: f64) -> Sea {
         Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0, finest: Finest::default() }
-    }
-
-    /// The open sea of a state, at a level (m), as deep as the state says.
-    ///
-    /// # Errors
-    /// If a number of the state makes no sense.
-    pub fn of_state(datum: Datum, level: f64, state: &SeaState) -> Result<Sea, OutOfRange> {
-        let sea = Sea::new(datum, level);
-        let (Some((low, high)), Some(peak)) = (state.band(), state.peak()) else { return Ok(sea) };
-        let mut waves = crate::waves::components::drawn(state, 64, low, 2.0 * peak);
-        waves.extend(crate::waves::components::drawn(state, 64, 2.0 * peak, high));
-        waves.extend(crate::waves::components::drawn(state, 64, high, 2.5f64.max(1.5 * high)));
-        Ok(sea.with(Box::new(Superposition::new(&waves, state.water())?)).with_finest(state, 2.5))
-    }
-
-    /// The sea of a state over `water` on `land`; `None` for a calm.
-    pub fn over(land: &Land, water: &Water, state: &SeaState) -> Option<Sea> {
-        let (low, high) = state.band()?;
-        let peak = state.peak()?;
-        let datum = Datum::Plane { origin: land.origin(), size: land.extent() };
-        let mut waves = crate::waves::components::drawn(state, 64, low, 2.0 * peak);
-        waves.extend(crate::waves::components::drawn(state, 64, 2.0 * peak, high));
-        waves.extend(crate::waves::components::drawn(state, 64, high, 2.5f64.max(1.5 * high)));
-        let sum = Superposition::new(&waves, state.water()).ok()?;
-        Some(
-            Sea::new(datum, water.level)
-                .with(Box::new(Sheltered::new(Box::new(sum), shelter(land, water, state)?)))
-                .with_finest(state, 2.5),
-        )
-    }
-
-    /// The same with ripples too fine for any model, so that all slopes together are those that C. Cox and W. Munk (1954) saw under the state's
-    /// wind: 0.003 + 0.00508 U, of which the models have those of frequencies up to `highest` (Hz).
-    fn with_finest(mut self, state: &SeaState, highest: f64) -> Sea {
-        let seen = 0.003 + 5.08e-3 * state.wind.speed;
-        let modelled = state.band().map_or(0.0, |(low, _)| {
-            // Slopes are k = (2πf)²/g times heights.
-            libm::pow(std::f64::consts::TAU, 4.0) / (STANDARD_GRAVITY * STANDARD_GRAVITY)
-                * state.moment(4, low, highest)
-        });
-        let left = (seen - modelled).max(0.15 * seen);
-        self.finest = Finest { variance: (0.5 * left) as f32, heading: state.wind.heading };
-        self
     }
 
     /// The ripples that are too fine for its models.
@@ -348,23 +304,6 @@ impl Sea {
         let b = &self.bounds;
         if b.stretch < 1.0 { b.slope / (1.0 - b.stretch) } else { f32::INFINITY }
     }
-}
-
-/// How depth lowers waves that are not solved for over the bed: their height is at most 0.55 of it.
-fn shelter(land: &Land, water: &Water, state: &SeaState) -> Option<Shelter> {
-    let raster = land.raster();
-    let height = state.significant_height();
-    let factor = |i: usize| {
-        if raster.voids().is_void(i) {
-            return 1.0;
-        }
-        let depth = water.level - f64::from(raster.heights()[i]);
-        let most = 0.55 * depth.max(0.0) / height.max(1e-3);
-        // Smoothly towards 1.
-        (most / libm::sqrt(libm::sqrt(1.0 + most * most * most * most))) as f32
-    };
-    let factors = (0..raster.columns() * raster.rows()).map(factor).collect();
-    Shelter::new(land.origin(), raster.spacing(), raster.columns(), raster.rows(), factors).ok()
 }
 
 /// A block of up to [`BLOCK`] places; the last fills what is over.
