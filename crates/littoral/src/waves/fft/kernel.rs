@@ -414,4 +414,31 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn lines_are_what_rustfft_makes_of_them() {
+        for samples in [64, 256, 512, 1024] {
+            let source: Vec<Wide> = (0..samples)
+                .map(|m| Wide {
+                    re: std::array::from_fn(|l| number(m, l)),
+                    im: std::array::from_fn(|l| number(m, 16 + l)),
+                })
+                .collect();
+            let at: Vec<u32> = (0..samples as u32).collect();
+            let (mut result, mut spare) = (vec![Wide::ZERO; samples], vec![Wide::ZERO; samples]);
+            let line = Line::new(samples);
+            line.run(&source, &at, 0, false, &mut result, &mut spare);
+            let plan = rustfft::FftPlanner::new().plan_fft_inverse(samples);
+            for l in 0..LANES {
+                let mut theirs: Vec<_> =
+                    source.iter().map(|s| rustfft::num_complex::Complex::new(s.re[l], s.im[l])).collect();
+                plan.process(&mut theirs);
+                let scale = 1e-6 * (samples as f32).sqrt();
+                for (theirs, &p) in theirs.iter().zip(&line.position) {
+                    let ours = &result[p as usize];
+                    assert!((ours.re[l] - theirs.re).hypot(ours.im[l] - theirs.im) < scale, "{samples}");
+                }
+            }
+        }
+    }
 }
