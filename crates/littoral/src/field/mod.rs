@@ -11,7 +11,7 @@ pub mod noise;
 mod pyramid;
 mod raster;
 
-pub(crate) use blocks::{BLOCK_LEVELS, Block, Blocks};
+pub(crate) use blocks::{BLOCK_LEVELS, Block};
 pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;
