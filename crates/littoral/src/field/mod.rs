@@ -13,7 +13,7 @@ mod raster;
 mod sea;
 mod water;
 
-pub(crate) use blocks::{BLOCK_LEVELS, Block, Blocks};
+pub(crate) use blocks::{BLOCK_LEVELS, Block};
 pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;
