@@ -10,8 +10,10 @@ mod land;
 pub mod noise;
 mod pyramid;
 mod raster;
+mod windows;
 
 pub(crate) use blocks::{BLOCK_LEVELS, Block, Blocks};
+pub(crate) use windows::FINEST_WINDOWS;
 pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;
