@@ -13,11 +13,11 @@ mod raster;
 mod windows;
 
 pub(crate) use blocks::{BLOCK_LEVELS, Block, Blocks};
-pub(crate) use windows::FINEST_WINDOWS;
 pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
+pub(crate) use windows::FINEST_WINDOWS;
 
 use crate::space::{Cell, Datum, Place};
 

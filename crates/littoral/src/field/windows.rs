@@ -40,12 +40,8 @@ impl Windows {
         for n in FINEST_WINDOWS - 1..levels.len() {
             let first = [window.column >> (n + 1), window.row >> (n + 1)].map(|node| node.saturating_sub(2));
             let end = [(window.column + window.columns - 1) >> (n + 1), (window.row + window.rows - 1) >> (n + 1)];
-            let nodes = Window {
-                column: first[0],
-                row: first[1],
-                columns: end[0] + 1 - first[0],
-                rows: end[1] + 1 - first[1],
-            };
+            let nodes =
+                Window { column: first[0], row: first[1], columns: end[0] + 1 - first[0], rows: end[1] + 1 - first[1] };
             self.renew(n, nodes, levels, highs);
         }
     }
@@ -96,7 +92,8 @@ mod tests {
                 let level = pyramid.levels[k + FINEST_WINDOWS - 1];
                 let node = |i: usize, j: usize| pyramid.highs[level.offset + j * level.columns + i];
                 for (i, j) in (0..here.rows).flat_map(|j| (0..here.columns).map(move |i| (i, j))) {
-                    let nine = (j..(j + 3).min(here.rows)).flat_map(|j| (i..(i + 3).min(here.columns)).map(move |i| (i, j)));
+                    let nine =
+                        (j..(j + 3).min(here.rows)).flat_map(|j| (i..(i + 3).min(here.columns)).map(move |i| (i, j)));
                     let highest = nine.map(|(i, j)| node(i, j)).max();
                     assert_eq!(Some(windows.highs[here.offset + j * here.columns + i]), highest, "{k}: {i}, {j}");
                 }

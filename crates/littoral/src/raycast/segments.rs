@@ -67,7 +67,8 @@ impl RayCaster<'_> {
     /// Decides the segments that looks decide, and lists the others.
     fn look(&self, scene: &Scene, segments: &[[Vec3; 2]], visible: &mut [bool], doubt: &mut Doubt) {
         let Some(tops) = Tops::new(self.land.ranges(), scene) else {
-            doubt.open.extend((0..segments.len() as i32).map(|index| Open { index, from: 0.0, to: 1.0 }));
+            visible.fill(true);
+            doubt.open.extend((0..segments.len() as i32).map(|index| Open { index, from: 0.0, to: 1.0, level: FAR }));
             return;
         };
         #[cfg(target_arch = "x86_64")]
@@ -94,21 +95,27 @@ impl RayCaster<'_> {
     }
 }
 
+/// Levels at which walks begin, by how long they may be.
+const FAR: i32 = 5;
+const NEAR: i32 = 2;
+
 /// What looks leave open.
 #[derive(Default)]
 struct Doubt {
-    /// Segments that start above the surface or at their first open piece, and the fractions between which they are open.
+    /// Open parts of segments.
     open: Vec<Open>,
     /// Segments to be walked by the sheet.
     sheet: Vec<i32>,
 }
 
-/// A segment of which a part is open.
+/// An open part of a segment, from fraction to fraction: the rest of it is clear, or another part. Above the surface at
+/// its begin, unless the segment begins there. Then the level to begin with.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     index: i32,
     from: f32,
     to: f32,
+    level: i32,
 }
 
 /// The open segments as rays over the surface.
@@ -120,9 +127,6 @@ struct Rest<'a> {
     below: &'a mut Vec<i32>,
 }
 
-/// Level at which walks begin: the open pieces are short.
-const START: i32 = 4;
-
 impl Rays for Rest<'_> {
     const REFILL: u32 = 12;
     const RISE: i32 = 1;
@@ -132,12 +136,12 @@ impl Rays for Rest<'_> {
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
         block.count = (self.open.len() - self.next).min(BLOCK);
         for at in (0..block.count).step_by(L::COUNT) {
-            let (mut id, mut numbers) = ([0; 16], [[0.0; 16]; 8]);
+            let (mut id, mut level, mut numbers) = ([0; 16], [0; 16], [[0.0; 16]; 8]);
             for lane in 0..L::COUNT {
                 // The last vector repeats the last ray.
                 let open = self.open[self.next + (at + lane).min(block.count - 1)];
                 let [from, to] = self.segments[open.index as usize];
-                id[lane] = open.index;
+                (id[lane], level[lane]) = (open.index, open.level.min(scene.top));
                 let by = to - from;
                 let from = [from.x, from.y, from.z, by.x, by.y, by.z, open.from, open.to];
                 for (number, from) in numbers.iter_mut().zip(from) {
@@ -147,14 +151,14 @@ impl Rays for Rest<'_> {
             let origin = [l.load(&numbers[0]), l.load(&numbers[1]), l.load(&numbers[2])];
             let direction = [l.load(&numbers[3]), l.load(&numbers[4]), l.load(&numbers[5])];
             let (from, to) = (l.load(&numbers[6]), l.load(&numbers[7]));
-            block.set(l, scene, at, l.load_int(&id), origin, direction, to, from, l.int(scene.top.min(START)));
+            block.set(l, scene, at, l.load_int(&id), origin, direction, to, from, l.load_int(&level));
         }
         self.next += block.count;
     }
 
     #[inline(always)]
     fn done(&mut self, id: i32, distance: f32) {
-        self.visible[id as usize] = distance == f32::INFINITY;
+        self.visible[id as usize] &= distance == f32::INFINITY;
     }
 
     #[inline(always)]
@@ -307,31 +311,25 @@ impl Cut {
     }
 }
 
-/// A low to look at: level of the nodes.
-const LOW_LEVEL: i32 = 4;
+/// The looks at lows: level of the nodes, and where in the sixteenths of what is open the points lie.
+const LOOKS: [(i32, f32); 2] = [(4, 0.5), (3, 0.0)];
 /// How many open pieces are cut again at most.
 const MOST_OPEN: u32 = 8;
 
 #[inline(always)]
-fn looks<L: Lanes>(
-    l: L,
-    scene: &Scene,
-    tops: &Tops,
-    segments: &[[Vec3; 2]],
-    visible: &mut [bool],
-    doubt: &mut Doubt,
-) {
+fn looks<L: Lanes>(l: L, scene: &Scene, tops: &Tops, segments: &[[Vec3; 2]], visible: &mut [bool], doubt: &mut Doubt) {
     let zeros = [[0.0; ROOM]; 3];
     let mut group = Group { from: zeros, by: zeros, coarse: Cut::new(), fine: Cut::new() };
     let (mut masks, mut doubtful) = ([0u32; GROUP], [0u32; GROUP]);
-    let (mut first, mut last) = ([0u32; GROUP], [0u32; GROUP]);
+    let mut fine = [0u32; GROUP];
     // What is yet to be decided, what has open pieces to be looked at for lows, what is blocked if it starts above the surface.
     let (mut list, mut under, mut candidates) = ([0u16; ROOM], [0u16; ROOM], [0u16; ROOM]);
+    let mut mostly_blocked = false;
     for (base, (segments, visible)) in
         segments.chunks(GROUP).zip(visible.chunks_mut(GROUP)).enumerate().map(|(n, both)| (n * GROUP, both))
     {
         let index = |i: u16| (base + i as usize) as i32;
-        let mut count = 0;
+        let (mut count, mut blocked) = (0, 0);
         for at in (0..segments.len()).step_by(L::COUNT) {
             let (finite, inside) = group.set(l, scene, tops, segments, at);
             for i in at..(at + L::COUNT).min(segments.len()) {
@@ -339,91 +337,95 @@ fn looks<L: Lanes>(
                     doubt.sheet.push(index(i as u16));
                     continue;
                 }
+                if mostly_blocked && group.lies_under(l, scene, i, LOOKS[0].0, 1.0 / 32.0, 1.0 / 16.0) {
+                    visible[i] = false;
+                    candidates[blocked] = i as u16;
+                    blocked += 1;
+                    continue;
+                }
                 let open = group.coarse.open(l, tops, i, 0.0);
                 masks[i] = open;
                 // If its first piece is clear, it starts above the surface, or beside the map.
                 doubtful[i] = open & 1 | !(inside >> (i - at)) & 1;
-                visible[i] = open == 0;
+                visible[i] = true;
                 list[count] = i as u16;
                 count += (open != 0) as usize;
             }
         }
-        let (mut left, mut blocked) = (0, 0);
-        for n in 0..count {
-            let i = list[n];
-            let found = group.lies_under(l, scene, i as usize, LOW_LEVEL, 1.0 / 32.0, 1.0 / 16.0);
-            candidates[blocked] = i;
-            list[left] = i;
-            blocked += (found & (doubtful[i as usize] != 0)) as usize;
-            left += !found as usize;
+        for (level, shift) in LOOKS {
+            let mut left = 0;
+            for n in 0..count {
+                let i = list[n];
+                let open = masks[i as usize];
+                let (from, to) = (open.trailing_zeros() as f32 / 16.0, (32 - open.leading_zeros()) as f32 / 16.0);
+                let pitch = (to - from) / 16.0;
+                let found = group.lies_under(l, scene, i as usize, level, from + shift * pitch, pitch);
+                visible[i as usize] = !found;
+                candidates[blocked] = i;
+                list[left] = i;
+                blocked += (found & (doubtful[i as usize] != 0)) as usize;
+                left += !found as usize;
+            }
+            count = left;
         }
-        count = left;
-        left = 0;
+        // Where most are blocked, the next ones are looked at for that first. It changes nothing but the time.
+        mostly_blocked = 4 * visible.iter().filter(|visible| !**visible).count() > 3 * segments.len();
+        let mut left = 0;
         for n in 0..count {
             let i = list[n];
             let open = masks[i as usize];
-            (first[i as usize], last[i as usize]) = (256, 0);
+            list[left] = i;
+            left += (open.count_ones() <= MOST_OPEN) as usize;
             if open.count_ones() > MOST_OPEN {
-                let found = group.lies_under(l, scene, i as usize, 2, 1.0 / 64.0, 1.0 / 16.0)
-                    || group.lies_under(l, scene, i as usize, 2, 3.0 / 64.0, 1.0 / 16.0);
+                let (from, to) = (open.trailing_zeros() as f32 / 16.0, (32 - open.leading_zeros()) as f32 / 16.0);
+                let pitch = (to - from) / 16.0;
+                let found = group.lies_under(l, scene, i as usize, 2, from + 0.25 * pitch, pitch)
+                    || group.lies_under(l, scene, i as usize, 2, from + 0.75 * pitch, pitch);
+                visible[i as usize] = !found;
+                candidates[blocked] = i;
+                blocked += (found & (doubtful[i as usize] != 0)) as usize;
                 if found {
-                    candidates[blocked] = i;
-                    blocked += doubtful[i as usize] as usize;
-                } else {
-                    let (from, to) = (open.trailing_zeros() as f32 / 16.0, (32 - open.leading_zeros()) as f32 / 16.0);
-                    doubt.open.push(Open { index: index(i), from, to });
+                    continue;
                 }
-            } else {
-                list[left] = i;
-                left += 1;
+                doubt.open.push(Open { index: index(i), from, to, level: FAR });
             }
         }
         count = left;
         // One open piece of each segment after the other.
         while count > 0 {
-            let mut unders = 0;
+            let (mut left, mut unders) = (0, 0);
             for n in 0..count {
                 let i = list[n] as usize;
-                let piece = 16 * masks[i].trailing_zeros();
-                let open = group.fine.open(l, tops, i, piece as f32);
-                let nothing = open == 0;
-                first[i] = first[i].min(if nothing { 256 } else { piece + open.trailing_zeros() });
-                last[i] = if nothing { last[i] } else { piece + 32 - open.leading_zeros() };
+                fine[i] = group.fine.open(l, tops, i, 16.0 * masks[i].trailing_zeros() as f32);
                 under[unders] = i as u16;
-                unders += !nothing as usize;
+                unders += (fine[i] != 0) as usize;
             }
             for i in &under[..unders] {
                 let i = *i as usize;
                 let piece = masks[i].trailing_zeros() as f32 / 16.0;
-                let found = group.lies_under(l, scene, i, 3, piece + 1.0 / 512.0, 1.0 / 256.0);
-                // Zero marks what is blocked.
-                last[i] = if found { 0 } else { last[i] };
-                masks[i] = if found { 0 } else { masks[i] };
+                if group.lies_under(l, scene, i, 3, piece + 1.0 / 512.0, 1.0 / 256.0) {
+                    masks[i] = 0;
+                    visible[i] = false;
+                    candidates[blocked] = i as u16;
+                    blocked += doubtful[i] as usize;
+                } else {
+                    let from = piece + fine[i].trailing_zeros() as f32 / 256.0;
+                    let to = piece + (32 - fine[i].leading_zeros()) as f32 / 256.0;
+                    doubt.open.push(Open { index: index(i as u16), from, to, level: NEAR });
+                }
             }
-            left = 0;
             for n in 0..count {
                 let i = list[n] as usize;
                 masks[i] &= masks[i].wrapping_sub(1);
                 list[left] = i as u16;
                 left += (masks[i] != 0) as usize;
-                if masks[i] == 0 {
-                    if first[i] == 256 {
-                        visible[i] = true;
-                    } else if last[i] == 0 {
-                        candidates[blocked] = i as u16;
-                        blocked += doubtful[i] as usize;
-                    } else {
-                        let (from, to) = (first[i] as f32 / 256.0, last[i] as f32 / 256.0);
-                        doubt.open.push(Open { index: index(i as u16), from, to });
-                    }
-                }
             }
             count = left;
         }
         // These are surely blocked if they start above the surface, or end there. Their heights come last and together,
         // since each is far from the others in memory.
         for end in 0..2 {
-            left = 0;
+            let mut left = 0;
             for at in (0..blocked).step_by(L::COUNT) {
                 let mut place = [[0.0; 16]; 3];
                 for lane in 0..L::COUNT {
@@ -468,7 +470,8 @@ impl Group {
         }
         // Ten times what single precision rounds off.
         let cell = (scene.cell[0].abs() + scene.cell[1].abs()) as f32;
-        let size = l.add(l.add(absolute(l, from[0]), absolute(l, by[0])), l.add(absolute(l, from[1]), absolute(l, by[1])));
+        let size =
+            l.add(l.add(absolute(l, from[0]), absolute(l, by[0])), l.add(absolute(l, from[1]), absolute(l, by[1])));
         let slack = l.mul(l.add(size, l.splat(cell)), l.splat(1e-6));
         let size = l.add(l.add(absolute(l, from[2]), absolute(l, by[2])), l.splat(tops.base.abs()));
         let slack = (slack, l.mul(size, l.splat(1e-6)));
