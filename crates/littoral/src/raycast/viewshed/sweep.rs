@@ -367,28 +367,35 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
             let first = rings.rings[1].ring as f32;
             let crest = Crest { from: crest_from, to: crest_to, before: before_crest, after: after_crest, first };
             let doubt = Doubt { row, doubtful, index, whole, peak: b, step, sample, at, twist, crest };
+            let (past, ago, pending) = (&*past, &bins.ago, &mut *pending);
             // SAFETY: the caller vouches for the instructions.
             visible |= unsafe {
-                resolve::<V, VOIDS>(
-                    rings,
-                    past,
-                    &bins.ago,
-                    doubt,
-                    target_height,
-                    left as f32,
-                    |lanes, open_from, open_to| {
-                        let mut lanes = lanes;
-                        while lanes != 0 {
-                            let lane = lanes.trailing_zeros();
-                            let place = (has & ((1 << lane) - 1)).count_ones();
-                            if asked >> place & 1 == 1 {
-                                let minor = base + i64::from(place);
-                                let (from, to) =
-                                    (open_from.lane(lane as usize) as i64, open_to.lane(lane as usize) as i64);
-                                pending.push(Pending { ring: ring.ring, minor, from, to });
-                            }
-                            lanes &= lanes - 1;
-                        }
+                V::apart(
+                    #[inline(always)]
+                    move || {
+                        resolve::<V, VOIDS>(
+                            rings,
+                            past,
+                            ago,
+                            doubt,
+                            target_height,
+                            left as f32,
+                            #[inline(always)]
+                            |lanes, open_from, open_to| {
+                                let mut lanes = lanes;
+                                while lanes != 0 {
+                                    let lane = lanes.trailing_zeros();
+                                    let place = (has & ((1 << lane) - 1)).count_ones();
+                                    if asked >> place & 1 == 1 {
+                                        let minor = base + i64::from(place);
+                                        let (from, to) =
+                                            (open_from.lane(lane as usize) as i64, open_to.lane(lane as usize) as i64);
+                                        pending.push(Pending { ring: ring.ring, minor, from, to });
+                                    }
+                                    lanes &= lanes - 1;
+                                }
+                            },
+                        )
                     },
                 )
             };
