@@ -21,3 +21,4 @@ pub mod flight;
 pub mod picture;
 pub mod raycast;
 pub mod space;
+pub mod waves;
