@@ -394,8 +394,8 @@ fn looks<L: Lanes>(l: L, scene: &Scene, tops: &Tops, segments: &[[Vec3; 2]], vis
         // One open piece of each segment after the other.
         while count > 0 {
             let (mut left, mut unders) = (0, 0);
-            for n in 0..count {
-                let i = list[n] as usize;
+            for &i in &list[..count] {
+                let i = i as usize;
                 fine[i] = group.fine.open(l, tops, i, 16.0 * masks[i].trailing_zeros() as f32);
                 under[unders] = i as u16;
                 unders += (fine[i] != 0) as usize;
@@ -477,10 +477,10 @@ impl Group {
         let slack = (slack, l.mul(size, l.splat(1e-6)));
         let mut inside = l.lt(l.add(slack.0, slack.1), l.splat(f32::INFINITY));
         let finite = l.bits(inside);
-        for axis in 0..2 {
-            from[axis] = l.add(from[axis], l.splat(scene.cell[axis] as f32));
-            inside = l.and(inside, l.lt(slack.0, from[axis]));
-            inside = l.and(inside, l.lt(l.add(from[axis], slack.0), l.splat(scene.cells[axis] as f32)));
+        for (axis, from) in from.iter_mut().enumerate().take(2) {
+            *from = l.add(*from, l.splat(scene.cell[axis] as f32));
+            inside = l.and(inside, l.lt(slack.0, *from));
+            inside = l.and(inside, l.lt(l.add(*from, slack.0), l.splat(scene.cells[axis] as f32)));
         }
         self.coarse.set(l, tops, at, from, by, slack, 1.0 / 16.0);
         self.fine.set(l, tops, at, from, by, slack, 1.0 / 256.0);
