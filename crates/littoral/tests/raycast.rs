@@ -476,6 +476,57 @@ fn single_rays_equal_the_exact_walk_on_large_maps() {
     }
 }
 
+/// Maps with coarse levels, from far above the ground to below it, from beside the map and over all lengths: held against
+/// the stream that is held against brute force.
+#[test]
+fn lines_of_sight_equal_streams_on_large_maps() {
+    for (seed, columns, rows, spacing) in [(1, 40, 33, 9.0), (2, 258, 71, 30.0), (3, 700, 650, 7.3), (4, 3000, 90, 2.0)]
+    {
+        let mut state = u64::from(seed);
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let noise = littoral::field::noise::Fbm::new(180.0 * spacing, 25.0 * spacing, 7, seed);
+        let place = |i: usize| DVec2::new((i % columns) as f64, (i / columns) as f64) * spacing;
+        let heights = (0..columns * rows).map(|i| noise.at(place(i)).value as f32).collect();
+        let land =
+            Land::at(Raster::new(columns, rows, DVec2::splat(spacing), heights).expect("valid"), DVec2::new(9e5, -7e4));
+        let anchor = (land.origin() + 0.3 * land.extent()).extend(10.0);
+        let segments: Vec<[Vec3; 2]> = (0..if cfg!(miri) { 30 } else { 20_000 })
+            .map(|n| {
+                let mut end = |near: Option<DVec2>| {
+                    let at = DVec2::new(random(), random());
+                    let at = match near {
+                        Some(near) if n % 3 == 0 => near + (at - 0.5) * 20.0 * spacing,
+                        // One in five beside the map.
+                        _ if n % 5 == 0 => land.origin() + land.extent() * (at * 1.6 - 0.3),
+                        _ => land.origin() + land.extent() * at,
+                    };
+                    let inside = (at - land.origin()).clamp(DVec2::ZERO, land.extent() * 0.999) + land.origin();
+                    let ground = f64::from(land.height_at(inside).expect("on the map"));
+                    at.extend(ground + spacing * 30.0 * (random() * random() - 0.04))
+                };
+                let from = end(None);
+                let to = end(Some(from.truncate()));
+                [from, to].map(|end| (end - anchor).as_vec3())
+            })
+            .collect();
+        let rays: Vec<LocalRay> = segments.iter().map(|[from, to]| LocalRay::between(*from, *to)).collect();
+        for simd in [Simd::Portable, Simd::Avx2, Simd::Avx512].into_iter().filter(|simd| simd.available()) {
+            let caster = land.caster(anchor).with_simd(simd);
+            let (mut visible, mut hits) = (vec![false; segments.len()], vec![false; segments.len()]);
+            caster.lines_of_sight(&segments, &mut visible);
+            caster.any_hits(&rays, &mut hits);
+            let blocked = hits.iter().filter(|hit| **hit).count();
+            assert!(cfg!(miri) || (2000..18_000).contains(&blocked), "{blocked} blocked on {columns} × {rows}");
+            for (segment, (visible, hit)) in segments.iter().zip(visible.iter().zip(&hits)) {
+                assert!(visible != hit, "{segment:?} by {simd:?} on {columns} × {rows}: visible {visible}");
+            }
+        }
+    }
+}
+
 #[test]
 fn nonsense_meets_nothing() {
     let land = land(3, 17, 9, DVec2::ONE, Ground::Steep, 0);

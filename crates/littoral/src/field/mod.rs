@@ -12,6 +12,7 @@ mod pyramid;
 mod raster;
 mod sea;
 mod water;
+mod windows;
 
 pub(crate) use blocks::{BLOCK_LEVELS, Block};
 pub use deviation::ErrorPyramid;
@@ -20,6 +21,7 @@ pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
 pub use sea::{Finest, Sea, Surface};
 pub use water::Water;
+pub(crate) use windows::FINEST_WINDOWS;
 
 use crate::space::{Cell, Datum, Place};
 

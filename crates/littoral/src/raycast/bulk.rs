@@ -361,7 +361,7 @@ impl<T: Copy, const FOOTPRINT: bool> Rays for Stream<'_, T, FOOTPRINT> {
 }
 
 /// Runs the kernel compiled for `simd`.
-fn dispatch<R: Rays, const SHEET: bool, const ANY: bool>(simd: Simd, scene: &Scene, rays: &mut R) {
+pub(super) fn dispatch<R: Rays, const SHEET: bool, const ANY: bool>(simd: Simd, scene: &Scene, rays: &mut R) {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx512f,avx512dq,avx2,bmi1,bmi2,popcnt,lzcnt")]

@@ -35,6 +35,8 @@ pub(super) trait Lanes: Copy {
     /// Exclusive or of the bits with those of an integer: flips signs.
     fn flip(self, a: Self::F, bits: Self::I) -> Self::F;
 
+    /// The bits of numbers as integers.
+    fn to_bits(self, a: Self::F) -> Self::I;
     fn float(self, a: Self::I) -> Self::F;
     /// The greatest integer that is not greater; numbers outside the range of `i32` give anything.
     fn floor(self, a: Self::F) -> Self::I;
@@ -134,6 +136,7 @@ impl Lanes for Portable {
     #[inline(always)] fn le(self, a: Self::F, b: Self::F) -> Self::M { both(a, b, |a, b| a <= b) }
     #[inline(always)] fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F { pick(mask, a, b) }
     #[inline(always)] fn flip(self, a: Self::F, bits: Self::I) -> Self::F { std::array::from_fn(|i| f32::from_bits(a[i].to_bits() ^ bits[i] as u32)) }
+    #[inline(always)] fn to_bits(self, a: Self::F) -> Self::I { each(a, |a| a.to_bits() as i32) }
     #[inline(always)] fn float(self, a: Self::I) -> Self::F { each(a, |a| a as f32) }
     #[inline(always)] fn floor(self, a: Self::F) -> Self::I { each(a, |a| { let i = a as i32; if i as f32 > a { i.wrapping_sub(1) } else { i } }) }
     #[inline(always)] fn iadd(self, a: Self::I, b: Self::I) -> Self::I { both(a, b, i32::wrapping_add) }
@@ -244,6 +247,7 @@ mod x86 {
         #[inline(always)] fn le(self, a: Self::F, b: Self::F) -> Self::M { unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(a, b) } }
         #[inline(always)] fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm256_blendv_ps(b, a, mask) } }
         #[inline(always)] fn flip(self, a: Self::F, bits: Self::I) -> Self::F { unsafe { _mm256_xor_ps(a, _mm256_castsi256_ps(bits)) } }
+        #[inline(always)] fn to_bits(self, a: Self::F) -> Self::I { unsafe { _mm256_castps_si256(a) } }
         #[inline(always)] fn float(self, a: Self::I) -> Self::F { unsafe { _mm256_cvtepi32_ps(a) } }
         #[inline(always)] fn floor(self, a: Self::F) -> Self::I { unsafe { _mm256_cvttps_epi32(_mm256_floor_ps(a)) } }
         #[inline(always)] fn iadd(self, a: Self::I, b: Self::I) -> Self::I { unsafe { _mm256_add_epi32(a, b) } }
@@ -338,6 +342,7 @@ mod x86 {
         #[inline(always)] fn le(self, a: Self::F, b: Self::F) -> Self::M { unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) } }
         #[inline(always)] fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm512_mask_blend_ps(mask, b, a) } }
         #[inline(always)] fn flip(self, a: Self::F, bits: Self::I) -> Self::F { unsafe { _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(a), bits)) } }
+        #[inline(always)] fn to_bits(self, a: Self::F) -> Self::I { unsafe { _mm512_castps_si512(a) } }
         #[inline(always)] fn float(self, a: Self::I) -> Self::F { unsafe { _mm512_cvtepi32_ps(a) } }
         #[inline(always)] fn floor(self, a: Self::F) -> Self::I { unsafe { _mm512_cvt_roundps_epi32::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(a) } }
         #[inline(always)] fn iadd(self, a: Self::I, b: Self::I) -> Self::I { unsafe { _mm512_add_epi32(a, b) } }
