@@ -21,7 +21,12 @@ use std::ops::Range;
 const TILE: u32 = 64;
 const COARSE: u32 = 16;
 const FINE: u32 = tile::SIDE as u32;
+/// Width of a fine beam (cells) up to which its rays see few enough patches to walk together.
+const TOGETHER: f32 = 2.5;
 const FINE_IN_TILE: usize = ((TILE / FINE) * (TILE / FINE)) as usize;
+
+/// The id of a ray beyond the picture's edge: no index of a slice.
+const NOWHERE: i32 = -1;
 
 /// The pixels of a fine beam.
 const PIXEL_X: [i32; 16] = [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3];
@@ -50,19 +55,19 @@ pub(super) struct ViewRays<'a, const FOOTPRINT: bool> {
     left: Left,
 }
 
-/// Rays that are left to the stream: their pixels, and where and at which level they start. Room for another beam's, and
-/// for a whole vector to be read anywhere.
+/// Rays that are left to the stream: their pixels, and where and at which level they start. Fewer than a beam's, and room for
+/// another one's.
 struct Left {
     count: usize,
-    x: [i32; BLOCK + 32],
-    y: [i32; BLOCK + 32],
-    from: [f32; BLOCK + 32],
-    level: [i32; BLOCK + 32],
+    x: [i32; 32],
+    y: [i32; 32],
+    from: [f32; 32],
+    level: [i32; 32],
 }
 
 impl Left {
     fn new() -> Left {
-        let (numbers, integers) = ([0.0; BLOCK + 32], [0; BLOCK + 32]);
+        let (numbers, integers) = ([0.0; 32], [0; 32]);
         Left { count: 0, x: integers, y: integers, from: numbers, level: integers }
     }
 
@@ -218,6 +223,43 @@ impl<'a, const FOOTPRINT: bool> ViewRays<'a, FOOTPRINT> {
         }
     }
 
+    /// Prepares pixels for the stream.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "the numbers of a ray, each once")]
+    fn prepare<L: Lanes>(
+        &self,
+        l: L,
+        scene: &Scene,
+        block: &mut Prepared,
+        at: usize,
+        (x, y): (L::I, L::I),
+        from: L::F,
+        level: L::I,
+    ) {
+        let inside = l.and(l.igt(l.int(self.width as i32), x), l.igt(l.int(self.rows.end as i32), y));
+        let line = l.imul(l.isub(y, l.int(self.rows.start as i32)), l.int(self.width as i32));
+        let id = l.iselect(inside, l.iadd(line, x), l.int(NOWHERE));
+        let origin = [l.splat(self.eye.x), l.splat(self.eye.y), l.splat(self.eye.z)];
+        let direction = self.directions(l, x, y);
+        block.set(l, scene, at, id, origin, direction, l.splat(f32::INFINITY), from, level);
+        if FOOTPRINT {
+            l.store(l.splat(self.spread(scene)), &mut block.spread[at..]);
+        }
+    }
+
+    /// Moves up to sixteen of the rays that are left to the block.
+    #[inline(always)]
+    fn take<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
+        let count = self.left.count.min(16);
+        for part in (0..16).step_by(L::COUNT) {
+            let pixels = (l.load_int(&self.left.x[part..]), l.load_int(&self.left.y[part..]));
+            let (from, level) = (l.load(&self.left.from[part..]), l.load_int(&self.left.level[part..]));
+            self.prepare(l, scene, block, block.count + part, pixels, from, level);
+        }
+        block.count += count;
+        self.left.forget(count);
+    }
+
     /// Where the answer of a pixel goes.
     fn place(&self, x: u32, y: u32) -> usize {
         (y - self.rows.start) as usize * self.width as usize + x as usize
@@ -353,51 +395,59 @@ impl<const FOOTPRINT: bool> Rays for ViewRays<'_, FOOTPRINT> {
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
         let across = self.width.div_ceil(TILE);
         let tiles = across * (self.rows.end - self.rows.start).div_ceil(TILE);
-        while self.left.count < BLOCK && self.tile < tiles {
+        let cells = FINE as f32 * self.right.length() * scene.per_metre.max_element();
+        block.count = 0;
+        while block.count < BLOCK && self.tile < tiles {
             let (x, y) = (self.tile % across * TILE, self.rows.start + self.tile / across * TILE);
             if self.fine == 0 {
                 self.survey(l, scene, x, y);
             }
-            let fine = self.fine;
+            // Two by two, so that those that meet in the stream are neighbours.
+            let (group, beam) = (self.fine / 4, self.fine % 4);
+            let (bx, by) = (group % 8 * 2 + beam % 2, group / 8 * 2 + beam / 2);
+            let fine = (by * (TILE / FINE) + bx) as usize;
             self.fine += 1;
             if self.fine as usize == FINE_IN_TILE {
                 (self.fine, self.tile) = (0, self.tile + 1);
             }
-            let (x, y) = (x + fine % (TILE / FINE) * FINE, y + fine / (TILE / FINE) * FINE);
-            let (start, level) = (self.starts[fine as usize], self.levels[fine as usize]);
+            let (x, y) = (x + bx * FINE, y + by * FINE);
+            let (start, level) = (self.starts[fine], self.levels[fine]);
             if x >= self.width || y >= self.rows.end {
                 continue;
             }
             if start == f32::INFINITY {
                 self.nothing(x, y);
+            } else if start * cells > TOGETHER {
+                for part in (0..16).step_by(L::COUNT) {
+                    let ix = l.iadd(l.load_int(&PIXEL_X[part..]), l.int(x as i32));
+                    let iy = l.iadd(l.load_int(&PIXEL_Y[part..]), l.int(y as i32));
+                    let at = block.count + part;
+                    self.prepare(l, scene, block, at, (ix, iy), l.splat(start), l.int(level));
+                }
+                block.count += 16;
             } else {
                 self.walk(l, scene, (x, y), start, level);
+                if self.left.count >= 16 {
+                    self.take(l, scene, block);
+                }
             }
         }
-        let count = self.left.count.min(BLOCK);
-        let origin = [l.splat(self.eye.x), l.splat(self.eye.y), l.splat(self.eye.z)];
-        for at in (0..count).step_by(L::COUNT) {
-            let (x, y) = (l.load_int(&self.left.x[at..]), l.load_int(&self.left.y[at..]));
-            let line = l.imul(l.isub(y, l.int(self.rows.start as i32)), l.int(self.width as i32));
-            let direction = self.directions(l, x, y);
-            let (from, level) = (l.load(&self.left.from[at..]), l.load_int(&self.left.level[at..]));
-            let reach = l.splat(f32::INFINITY);
-            block.set(l, scene, at, l.iadd(line, x), origin, direction, reach, from, level);
-            if FOOTPRINT {
-                l.store(l.splat(self.spread(scene)), &mut block.spread[at..]);
-            }
+        if block.count < BLOCK && self.left.count > 0 {
+            self.take(l, scene, block);
         }
-        block.count = count;
-        self.left.forget(count);
     }
 
     #[inline(always)]
     fn done(&mut self, id: i32, distance: f32) {
-        self.distances[id as usize] = distance;
+        if let Some(place) = self.distances.get_mut(id as usize) {
+            *place = distance;
+        }
     }
 
     #[inline(always)]
     fn below(&mut self, id: i32) {
-        self.below.push(id);
+        if id != NOWHERE {
+            self.below.push(id);
+        }
     }
 }

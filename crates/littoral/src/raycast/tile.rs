@@ -27,9 +27,9 @@ use glam::Vec3;
 /// Pixels of a beam in a row.
 pub(super) const SIDE: usize = 4;
 /// Tests after which a beam is given up: about what its rays cost in the stream.
-const TESTS: u32 = 24;
+const TESTS: u32 = 32;
 /// Width at which it is given up (cells).
-const WIDTH: f32 = 6.0;
+const WIDTH: f32 = 2.5;
 
 /// The rays of a beam, from one eye.
 pub(super) struct Beam<'a, L: Lanes> {
