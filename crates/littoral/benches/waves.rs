@@ -122,7 +122,9 @@ fn queries() {
                 })
                 .collect(),
         );
-        let bounds = time(|| drop(black_box(sea.bounds())));
+        let bounds = time(|| {
+            black_box(sea.bounds());
+        });
         println!(
             "{name}: {} tiles, {:.0} MB, set up in {setting_up:.0} ms, a frame {step:.1} ms, a jump in time {jump:.0} ms, bounds {bounds:.1} ms",
             sea.tiles().len(),

@@ -18,6 +18,8 @@
 //! # Ok::<(), littoral::waves::OutOfRange>(())
 //! ```
 
+#![allow(clippy::needless_range_loop, reason = "loops over lanes become vector instructions in this form")]
+
 mod clock;
 mod energy;
 mod extent;
@@ -214,6 +216,7 @@ impl WaveModel for Cascades {
                 sum.slope += bounds.slope;
                 sum.stretch += bounds.stretch;
                 sum.curvature += bounds.curvature;
+                sum.bend += bounds.bend;
             }
             sum
         })

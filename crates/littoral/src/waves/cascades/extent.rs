@@ -52,8 +52,8 @@ fn norm(xx: f32, xy: f32, yy: f32) -> f32 {
     0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt()
 }
 
-/// Height, sideways, slope, stretch and curvature, of each lane.
-type Most = [Lane; 5];
+/// Height, sideways, slope, stretch, curvature and bend, of each lane.
+type Most = [Lane; 6];
 
 /// Grows `most` to the extents of patches.
 #[inline(always)]
@@ -64,14 +64,16 @@ fn grow(corners: &Corners, most: &mut Most) {
         let z = extents(at_corners(corners, l, Z, ZX, ZY), side);
         let x = extents(at_corners(corners, l, X, XX, XY), side);
         let y = extents(at_corners(corners, l, Y, XY, YY), side);
+        let (bend_x, bend_y) = (norm(x[3], x[4], x[5]), norm(y[3], y[4], y[5]));
         let here = [
             z[0],
             (x[0] * x[0] + y[0] * y[0]).sqrt(),
             (z[1] * z[1] + z[2] * z[2]).sqrt(),
             norm(x[1], 0.5 * (x[2] + y[1]), y[2]),
             norm(z[3], z[4], z[5]),
+            (bend_x * bend_x + bend_y * bend_y).sqrt(),
         ];
-        for k in 0..5 {
+        for k in 0..6 {
             most[k][l] = if here[k] > most[k][l] { here[k] } else { most[k][l] };
         }
     }
@@ -99,15 +101,15 @@ impl Patch {
         let (samples, stride) = (self.level(0), 16 * motion_stride(n));
         let mut corners = Corners::zero();
         corners.side = [(self.tile.length / n as f64) as f32; LANES];
-        let mut most = [[0.0; LANES]; 5];
+        let mut most = [[0.0; LANES]; 6];
         for j in 0..n {
             let above = (j + 1) & (n - 1);
             rows(&samples[j * stride..][..stride], &samples[above * stride..][..stride], &mut corners, &mut most);
         }
         // A little more than rounding can add.
-        let [height, sideways, slope, stretch, curvature] =
+        let [height, sideways, slope, stretch, curvature, bend] =
             most.map(|lane| lane.iter().fold(0.0, |a: f32, b| a.max(*b)) * 1.000_01);
-        Bounds { height, sideways, slope, stretch, curvature, bend: f32::INFINITY }
+        Bounds { height, sideways, slope, stretch, curvature, bend }
     }
 
     /// Variance that is to be expected of heights, or of sideways displacements if that is more, of waves shorter than a length (m).
@@ -117,8 +119,7 @@ impl Patch {
             (all[3] - present[3]).max(all[4] - present[4]).max(0.0)
         };
         let ratio = wavelength * self.tile.highest / TAU;
-        // Also false for NaN.
-        if !(ratio > 1.0) {
+        if ratio.is_nan() || ratio <= 1.0 {
             return 0.0;
         }
         let last = self.present.len() - 1;

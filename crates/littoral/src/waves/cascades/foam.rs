@@ -58,6 +58,13 @@ pub(super) fn upon(height: f32) -> f32 {
     (1.0 + 0.8 * height).clamp(0.0, 2.6)
 }
 
+/// Foam that finer waves gather where they press the water together by this many standard deviations, and part where they stretch it: neither
+/// full foam nor clear water, but their borders and what fades. It leaves the mean nearly as it is.
+#[inline(always)]
+pub(super) fn torn(foam: f32, pressed: f32) -> f32 {
+    (foam + 1.5 * foam * (1.0 - foam) * pressed.clamp(-2.0, 2.0)).clamp(0.0, 1.0)
+}
+
 impl Foam {
     /// For a tile whose stretches have variances by state; `None` where its waves are too short to make any, or too long.
     pub fn new(tile: &Tile, stretches: &[f64], states: &[SeaState]) -> Option<Foam> {

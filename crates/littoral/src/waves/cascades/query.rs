@@ -12,7 +12,7 @@ use super::super::fft::kernel::transpose;
 use super::super::fft::steps::{field, motion_stride};
 use super::super::fft::{LANES, Lane};
 use super::super::model::{BLOCK, Motion, Points};
-use super::foam::{Foam, upon};
+use super::foam::{Foam, torn, upon};
 use super::patch::Patch;
 use multiversion::multiversion;
 
@@ -295,19 +295,23 @@ pub(super) fn add_body(patches: &[Patch], points: &Points, whole: bool, motion: 
     let mut corners = Corners::zero();
     let before = motion.dz;
     let mut variance = 0.0;
+    let mut foam = [0.0; LANES];
+    // Where finer waves begin to tear foam: the stretch up to there, and the variance of theirs.
+    let mut whole_foam: Option<Lane> = None;
+    let mut tearing = 0.0;
     for (index, patch) in patches.iter().enumerate() {
         let cells = next;
         next = locate(&patches[(index + 1).min(patches.len() - 1)], points);
         let levels = levels(patch, points);
         let turn = (patch.turn.0 as f32, patch.turn.1 as f32);
-        if let (Some(foam), true) = (&patch.foam, whole) {
+        if let (Some(caps), true) = (&patch.foam, whole) {
             // What has been summed so far are the longer waves.
             let scale = if variance > 0.0 { 1.0 / libm::sqrt(variance) as f32 } else { 0.0 };
             for l in 0..LANES {
                 let width = f64::from(points.footprint[l]) * patch.tile.samples as f64 / patch.tile.length;
-                let covered = foam_at(foam, patch.tile.samples, cells.place.x[l], cells.place.y[l], width as f32);
+                let covered = foam_at(caps, patch.tile.samples, cells.place.x[l], cells.place.y[l], width as f32);
                 let covered = (covered * upon((motion.dz[l] - before[l]) * scale)).min(1.0);
-                motion.foam[l] += covered - motion.foam[l] * covered;
+                foam[l] += covered - foam[l] * covered;
             }
         }
         variance += patch.present[0][3];
@@ -335,7 +339,30 @@ pub(super) fn add_body(patches: &[Patch], points: &Points, whole: bool, motion: 
                 hide(patch, &levels, motion);
             }
         }
+        if whole_foam.is_some() {
+            tearing += patch.present[0][0] + patch.present[0][2];
+        } else if patch.foam.is_some() {
+            whole_foam = Some(stretch(motion));
+        }
     }
+    if let (Some(before), true) = (whole_foam, whole) {
+        let scale = if tearing > 0.0 { 1.0 / libm::sqrt(tearing) as f32 } else { 0.0 };
+        let after = stretch(motion);
+        for l in 0..LANES {
+            let own = torn(foam[l], (before[l] - after[l]) * scale);
+            motion.foam[l] += own - motion.foam[l] * own;
+        }
+    }
+}
+
+/// Divergence of the sideways motion.
+#[inline(always)]
+fn stretch(motion: &Motion) -> Lane {
+    let mut sum = [0.0; LANES];
+    for l in 0..LANES {
+        sum[l] = motion.dxx[l] + motion.dyy[l];
+    }
+    sum
 }
 
 /// Adds the slopes of the waves that were left out.

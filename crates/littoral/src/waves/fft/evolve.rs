@@ -143,6 +143,7 @@ fn sine_cosine(r: f32) -> (f32, f32) {
 }
 
 /// sin 2πs for |s| ≤ ¼.
+#[allow(clippy::approx_constant, reason = "the polynomial's own, a little less than 2π")]
 #[inline(always)]
 fn quarter_sine(s: f32) -> f32 {
     let z = s * s;
