@@ -41,28 +41,42 @@ fn range(state: &SeaState) -> (f64, f64) {
     (0.0, (end / step).ceil() * step)
 }
 
-/// The lowest and the highest of the peaks that stand out: frequency and density.
+/// Frequencies (Hz, rising) evenly between two, and the sharp corners and peaks of a state as they are.
+fn samples(state: &SeaState, low: f64, high: f64, count: usize) -> Vec<f64> {
+    let mut at: Vec<f64> = (0..=count).map(|i| low + (high - low) * i as f64 / count as f64).collect();
+    for train in &state.trains {
+        match train {
+            Train::Measured(sea) => at.extend(sea.bands().iter().map(|band| band.frequency)),
+            Train::Formula { spectrum, .. } => at.push(spectrum.peak),
+        }
+    }
+    at.retain(|f| (low..=high).contains(f));
+    at.sort_by(f64::total_cmp);
+    at.dedup();
+    at
+}
+
+/// The peaks that stand out, the highest first: frequency and density.
 fn peaks(state: &SeaState, low: f64, high: f64) -> Vec<(f64, f64)> {
     let most = highest(state, low, high);
-    let steps = 600;
-    let at = |i: usize| low + (high - low) * i as f64 / steps as f64;
-    let density: Vec<f64> = (0..=steps).map(|i| state.density(at(i))).collect();
+    let at = samples(state, low, high, 600);
+    let density: Vec<f64> = at.iter().map(|f| state.density(*f)).collect();
     let mut found: Vec<(f64, f64)> = Vec::new();
     if let Some(peak) = summary::peak(state).filter(|f| (low..=high).contains(f)) {
         found.push((peak, state.density(peak)));
     }
-    for i in 1..steps {
+    for i in 1..at.len().saturating_sub(1) {
         if density[i] < density[i - 1] || density[i] < density[i + 1] || density[i] < 0.12 * most {
             continue;
         }
         // It stands out if the land sinks to three quarters on the way to any higher one.
         let apart = found.iter().all(|&(f, _)| {
-            let j = ((f - low) / (high - low) * steps as f64).round() as usize;
-            let (a, b) = (i.min(j), i.max(j).min(steps));
+            let j = at.partition_point(|other| *other < f);
+            let (a, b) = (i.min(j), i.max(j).min(at.len() - 1));
             density[a..=b].iter().fold(f64::INFINITY, |least, d| least.min(*d)) < 0.75 * density[i]
         });
         if apart {
-            found.push((at(i), density[i]));
+            found.push((at[i], density[i]));
         }
     }
     found
@@ -113,7 +127,7 @@ impl<'a> Rise<'a> {
         canvas.text(DVec2::new(left, 1.9 * size), Anchor::Start, 1.25 * size, INK, &self.title);
         canvas.text(DVec2::new(left, 3.5 * size), Anchor::Start, size, GREY, &self.below);
 
-        for tick in ticks(0.0, ceiling, ((bottom - top) / (3.5 * size)).max(2.0)) {
+        for tick in ticks(0.0, ceiling, ((bottom - top) / (2.8 * size)).max(2.0)) {
             canvas.line(&across(y(tick)), LIGHT, 1.0);
             let at = DVec2::new(left - 0.5 * size, y(tick) + 0.35 * size);
             canvas.text(at, Anchor::End, size, INK, &digits(tick, 4));
@@ -162,17 +176,7 @@ impl<'a> Rise<'a> {
         pixels: usize,
     ) {
         let (low, high) = self.range;
-        let count = pixels.clamp(100, 2000);
-        let mut at: Vec<f64> = (0..=count).map(|i| low + (high - low) * i as f64 / count as f64).collect();
-        // Sharp corners and peaks as they are.
-        for train in &self.state.trains {
-            match train {
-                Train::Measured(sea) => at.extend(sea.bands().iter().map(|band| band.frequency)),
-                Train::Formula { spectrum, .. } => at.push(spectrum.peak),
-            }
-        }
-        at.retain(|f| (low..=high).contains(f));
-        at.sort_by(f64::total_cmp);
+        let at = samples(self.state, low, high, pixels.clamp(100, 2000));
         let curve = |density: &dyn Fn(f64) -> f64| -> Vec<DVec2> {
             at.iter().map(|&f| DVec2::new(x(f), y(density(f)))).collect()
         };
@@ -245,7 +249,7 @@ impl<'a> Rise<'a> {
             canvas.patch(&dot, colour);
         }
         let at = DVec2::new(left, bottom + 2.9 * size);
-        canvas.text(at, Anchor::Start, size, INK, "below: from where the waves come, mean ± spread");
+        canvas.text(at, Anchor::Start, size, INK, "lower panel: bearing from which the waves come, mean ± spread");
     }
 }
 
@@ -277,17 +281,56 @@ pub struct Polar {
 /// Rings and sectors of a rose.
 const RINGS: usize = 120;
 const SECTORS: usize = 180;
+/// Steps of its colours.
+const SHADES: f64 = 64.0;
+
+/// A round frequency (Hz) up to which all energy but a thirtieth lies.
+fn most_within(state: &SeaState, end: f64) -> f64 {
+    let at = samples(state, 0.0, end, 600);
+    let part = |pair: &[f64]| (pair[1] - pair[0]) * 0.5 * (state.density(pair[0]) + state.density(pair[1]));
+    let all: f64 = at.windows(2).map(part).sum();
+    let mut sum = 0.0;
+    let within = at.windows(2).find(|pair| {
+        sum += part(pair);
+        sum > 0.97 * all
+    });
+    let end = within.map_or(end, |pair| pair[1]);
+    let step = ticks(0.0, end, 8.0).get(1).copied().unwrap_or(end);
+    (end / step).ceil() * step
+}
 
 impl Polar {
     /// Of a state; `below` stands under the title; out to `end` (Hz), or to what is to be seen.
     pub fn new(state: &SeaState, title: String, below: String, size: UVec2, end: Option<f64>) -> Polar {
-        let end = end.filter(|end| *end > 0.0).unwrap_or_else(|| range(state).1);
-        let mut density = Vec::with_capacity(RINGS * SECTORS);
-        for ring in 0..RINGS {
-            let slice = state.slice(end * (ring as f64 + 0.5) / RINGS as f64);
-            for sector in 0..SECTORS {
-                let bearing = 360.0 * (sector as f64 + 0.5) / SECTORS as f64;
-                density.push(slice.density(heading_from_bearing(bearing)).to_radians());
+        let end = end.filter(|end| *end > 0.0).unwrap_or_else(|| most_within(state, range(state).1));
+        let mut density = vec![0.0; RINGS * SECTORS];
+        let frequency = |ring: usize| end * (ring as f64 + 0.5) / RINGS as f64;
+        for train in &state.trains {
+            let alone = SeaState { trains: vec![train.clone()], ..SeaState::CALM };
+            let sectors = |f: f64| -> Vec<f64> {
+                let slice = alone.slice(f);
+                let bearing = |sector: usize| 360.0 * (sector as f64 + 0.5) / SECTORS as f64;
+                (0..SECTORS).map(|i| slice.density(heading_from_bearing(bearing(i))).to_radians()).collect()
+            };
+            if let Train::Measured(sea) = train {
+                // Directions change from band to band: straight lines between them, as for the densities.
+                let bands: Vec<(f64, Vec<f64>)> =
+                    sea.bands().iter().map(|b| (b.frequency, sectors(b.frequency))).collect();
+                for ring in 0..RINGS {
+                    let above = bands.partition_point(|(f, _)| *f <= frequency(ring));
+                    let (Some((a, below)), Some((b, over))) = (bands.get(above.wrapping_sub(1)), bands.get(above))
+                    else {
+                        continue;
+                    };
+                    let share = (frequency(ring) - a) / (b - a);
+                    for sector in 0..SECTORS {
+                        density[ring * SECTORS + sector] += below[sector] + (over[sector] - below[sector]) * share;
+                    }
+                }
+                continue;
+            }
+            for (ring, cells) in density.chunks_mut(SECTORS).enumerate() {
+                cells.iter_mut().zip(sectors(frequency(ring))).for_each(|(cell, more)| *cell += more);
             }
         }
         let most = density.iter().copied().fold(0.0, f64::max);
@@ -309,19 +352,24 @@ impl Polar {
             let angle = bearing.to_radians();
             middle + DVec2::new(angle.sin(), -angle.cos()) * r
         };
-        let share = |density: f64| if self.most > 0.0 { (density / self.most).sqrt() } else { 0.0 };
+        let shade = |density: f64| if self.most > 0.0 { ((density / self.most).sqrt() * SHADES).round() } else { 0.0 };
         let step = 360.0 / SECTORS as f64;
         for ring in 0..RINGS {
             let (inner, outer) = (radius * ring as f64 / RINGS as f64, radius * (ring + 1) as f64 / RINGS as f64);
-            for sector in 0..SECTORS {
-                let density = self.density[ring * SECTORS + sector];
-                if density <= 1e-3 * self.most {
-                    continue;
+            let outer = (outer + 1.0).min(radius);
+            let shades: Vec<f64> = (0..SECTORS).map(|i| shade(self.density[ring * SECTORS + i])).collect();
+            let mut sector = 0;
+            while sector < SECTORS {
+                let run = shades[sector..].iter().take_while(|other| **other == shades[sector]).count();
+                if shades[sector] > 0.0 {
+                    // A little over the next cells, which are painted later: no seams.
+                    let over = (60.0 / outer.max(1.0)).min(step);
+                    let bearing = |i: usize| step * (sector + i) as f64 + if i == run { over } else { 0.0 };
+                    let out = (0..=run).map(|i| to(bearing(i), outer));
+                    let back = (0..=run).rev().map(|i| to(bearing(i), inner));
+                    canvas.patch(&out.chain(back).collect::<Vec<_>>(), energy(shades[sector] / SHADES));
                 }
-                // A little over the next cells, which are painted later: no seams.
-                let (a, b) = (step * sector as f64, step * (sector as f64 + 1.0) + 40.0 / outer.max(1.0));
-                let outer = (outer + 0.6).min(radius);
-                canvas.patch(&[to(a, inner), to(a, outer), to(b, outer), to(b, inner)], energy(share(density)));
+                sector += run;
             }
         }
         let circle = |r: f64| -> Vec<DVec2> { (0..=180).map(|i| to(2.0 * f64::from(i), r)).collect() };
@@ -349,6 +397,8 @@ impl Polar {
             );
         }
         canvas.line(&circle(radius), GREY, 1.2);
+        let foot = DVec2::new(1.6 * size, height - 1.2 * size);
+        canvas.text(foot, Anchor::Start, 0.9 * size, GREY, "bearing: where waves come from; outwards: frequency");
         self.key(canvas, width - 6.4 * size, [middle.y - 0.62 * radius, middle.y + 0.62 * radius], size);
     }
 
@@ -371,7 +421,7 @@ impl Polar {
         let steps = 64;
         for i in 0..steps {
             let (a, b) = (f64::from(i) / f64::from(steps), f64::from(i + 1) / f64::from(steps));
-            let above = (y(b) - 0.6).max(top);
+            let above = (y(b) - 1.5).max(top);
             let corners =
                 [DVec2::new(left, y(a)), DVec2::new(right, y(a)), DVec2::new(right, above), DVec2::new(left, above)];
             canvas.patch(&corners, energy(0.5 * (a + b)));
@@ -394,8 +444,6 @@ impl Polar {
             canvas.line(&[DVec2::new(right, at), DVec2::new(right + 0.35 * size, at)], GREY, 1.0);
             canvas.text(DVec2::new(right + 0.6 * size, at + 0.35 * size), Anchor::Start, size, INK, &digits(tick, 3));
         }
-        canvas.text(DVec2::new(left, bottom + 1.5 * size), Anchor::Start, 0.85 * size, GREY, "from where");
-        canvas.text(DVec2::new(left, bottom + 2.6 * size), Anchor::Start, 0.85 * size, GREY, "waves come");
     }
 }
 
