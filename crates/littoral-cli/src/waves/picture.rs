@@ -397,8 +397,8 @@ impl Polar {
             );
         }
         canvas.line(&circle(radius), GREY, 1.2);
-        let foot = DVec2::new(1.6 * size, height - 1.2 * size);
-        canvas.text(foot, Anchor::Start, 0.9 * size, GREY, "bearing: where waves come from; outwards: frequency");
+        let foot = DVec2::new(width - 1.6 * size, height - 1.2 * size);
+        canvas.text(foot, Anchor::End, 0.9 * size, GREY, "bearing: where waves come from; outwards: frequency");
         self.key(canvas, width - 6.4 * size, [middle.y - 0.62 * radius, middle.y + 0.62 * radius], size);
     }
 

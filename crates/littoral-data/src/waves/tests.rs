@@ -202,6 +202,45 @@ fn winds_are_told_from_the_range_of_balance() {
     assert_eq!(probable_wind(&flat.expect("bands")).speed, 0.0);
 }
 
+/// Heights of the summary that NDBC made of the same records.
+#[test]
+fn real_buoys_have_the_heights_that_ndbc_says() {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/waves"));
+    let Ok(summary) = std::fs::read_to_string(folder.join("41010.spec")) else {
+        println!("../shared/data is absent: no real buoys are read");
+        return;
+    };
+    let height = |record: &Record| {
+        let part = |pair: &[Band]| 0.5 * (pair[0].density + pair[1].density) * (pair[1].frequency - pair[0].frequency);
+        4.0 * record.measured.bands().windows(2).map(part).sum::<f64>().sqrt()
+    };
+    let buoy = Buoy::open(&folder.join("41010.swr2")).expect("real time");
+    assert_eq!((buoy.count(), buoy.warnings().len()), (149, 0));
+    let mut compared = 0;
+    for line in summary.lines().filter(|line| !line.starts_with('#')) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let time: Time = format!("{}-{}-{} {}:50", words[0], words[1], words[2], words[3]).parse().expect(line);
+        let Ok(expected) = words[5].parse::<f64>() else { continue };
+        let index = buoy.nearest(time);
+        if buoy.time(index) == time {
+            let record = buoy.record(index).expect(line);
+            assert!((height(&record) - expected).abs() < 0.05 + 0.03 * expected, "{line}: {}", height(&record));
+            assert!(record.notes.is_empty(), "{:?}", record.notes);
+            compared += 1;
+        }
+    }
+    assert!(compared > 140, "only {compared} records compared");
+    let year = Buoy::open(&folder.join("41010w2019part.txt.gz")).expect("historical");
+    assert_eq!((year.count(), year.warnings().len()), (99, 0));
+    for index in 0..year.count() {
+        let record = year.record(index).expect("fine");
+        assert_eq!(record.measured.bands().len(), 47);
+        assert!((0.3..8.0).contains(&height(&record)), "{}: {}", record.time, height(&record));
+        let strongest = record.measured.bands().iter().map(|b| b.first[0].hypot(b.first[1])).fold(0.0, f64::max);
+        assert!((0.5..=1.0).contains(&strongest), "hundredths are told: {strongest}");
+    }
+}
+
 proptest! {
     #[test]
     fn what_is_written_is_read(values in prop::collection::vec((0.0..500.0f64, 0.0..360.0f64, 0.0..360.0f64, 0.0..1.0f64, 0.0..1.0f64), 2..30)) {
