@@ -66,7 +66,7 @@ fn peaks(state: &SeaState, low: f64, high: f64) -> Vec<(f64, f64)> {
         found.push((peak, state.density(peak)));
     }
     for i in 1..at.len().saturating_sub(1) {
-        if density[i] < density[i - 1] || density[i] < density[i + 1] || density[i] < 0.12 * most {
+        if density[i] < density[i - 1] || density[i] < density[i + 1] || density[i] <= 0.12 * most {
             continue;
         }
         // It stands out if the land sinks to three quarters on the way to any higher one.
