@@ -52,8 +52,10 @@ fn told(resultant: DVec2, energy: f64) -> (Option<f64>, Option<f64>) {
         return (None, None);
     }
     let strength = (resultant.length() / energy).min(1.0);
-    let bearing = (strength > DIRECTED).then(|| bearing_from_heading(resultant.to_angle()));
-    (bearing, Some((2.0 * (1.0 - strength)).sqrt().to_degrees()))
+    // Sums leave noise in the last digits.
+    let round = |degrees: f64| (degrees * 1e8).round() / 1e8;
+    let bearing = (strength > DIRECTED).then(|| round(bearing_from_heading(resultant.to_angle())));
+    (bearing, Some(round((2.0 * (1.0 - strength)).sqrt().to_degrees())))
 }
 
 /// ∫ fⁿ S df and the sum of headings of what a buoy measured: straight lines between its frequencies.

@@ -225,19 +225,16 @@ impl Buoy {
 /// The wind (m/s at 10 m) that a measured sea tells of, from the range where the spectrum falls with f⁻⁴ in balance with the wind:
 /// S(f) = 4 β I g u* (2π)⁻³ f⁻⁴ with β = 0.012, I = 2.5 (J. Thomson et al., "Waves and the equilibrium range at Ocean Weather Station P",
 /// J. Geophys. Res. 118, 2013), and a logarithmic profile over H. Charnock's roughness 0.012 u*² / g. Its heading is the mean one of that
-/// range; 0 for a flat sea. An estimate: full-grown Pierson–Moskowitz seas of 5, 10 and 20 m/s give 5.2, 9.4 and 15.8 m/s.
+/// range; 0 for a flat sea. An estimate: full-grown Pierson–Moskowitz seas of 5, 10 and 20 m/s give 6.1, 10.8 and 18.8 m/s.
 pub fn probable_wind(measured: &Measured) -> Wind {
     let bands = measured.bands();
     let level = |band: &Band| band.density * band.frequency.powi(4);
     let Some(top) = bands.iter().max_by(|a, b| level(a).total_cmp(&level(b))) else {
         return Wind { speed: 0.0, heading: 0.0 };
     };
-    // The peak of a young sea stands out of the range, noise hides its end.
-    let within = |band: &&Band| band.frequency >= 1.2 * top.frequency && band.frequency <= 2.0 * top.frequency;
+    // The middle of these: the peak of a young sea stands out of the range, noise and rounding hide its end.
+    let within = |band: &&Band| band.frequency >= 0.67 * top.frequency && band.frequency <= 1.5 * top.frequency;
     let mut range: Vec<&Band> = bands.iter().filter(within).collect();
-    if range.len() < 3 {
-        range = vec![top];
-    }
     let sum = range.iter().fold([0.0, 0.0], |sum, band| [0, 1].map(|i| sum[i] + level(band) * band.first[i]));
     range.sort_by(|a, b| level(a).total_cmp(&level(b)));
     let friction = level(range[range.len() / 2]) * TAU.powi(3) / (4.0 * 0.012 * 2.5 * STANDARD_GRAVITY);
