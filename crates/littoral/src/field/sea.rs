@@ -7,7 +7,9 @@
 //!
 //! One function serves pictures, queries and meshes, so that a boat floats on the water that is seen.
 
-use super::{HeightField, HeightRange};
+mod build;
+
+use super::{HeightField, HeightRange, Land, Water};
 use crate::space::{Cell, Datum, Place};
 use crate::waves::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
 use glam::{DVec2, DVec3, Vec2, Vec3};
@@ -21,11 +23,36 @@ pub struct Sea {
     datum: Datum,
     bounds: Bounds,
     time: f64,
+    finest: Finest,
+    rises: [Rise; OCTAVES],
+}
+
+/// How fast the surface can be expected to rise over a distance d: by no more than `jump` + `slope` · d, all but never.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Rise {
+    /// What waves shorter than some length rise at once (m).
+    pub jump: f32,
+    /// How steep the others are.
+    pub slope: f32,
+}
+
+/// Lengths at which waves are told short from long, each twice the one before.
+const OCTAVES: usize = 12;
+/// The shortest of them (m).
+const SHORTEST: f32 = 0.125;
+
+/// The ripples that are too fine for any model: slopes without heights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Finest {
+    /// Variance of their slopes in each direction.
+    pub variance: f32,
+    /// Where they run to (rad, counter-clockwise from x).
+    pub heading: f64,
 }
 
 impl std::fmt::Debug for Sea {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Sea { models, level, datum, bounds, time } = self;
+        let Sea { models, level, datum, bounds, time, finest, .. } = self;
         let models = models.len();
         f.debug_struct("Sea")
             .field("models", &models)
@@ -33,7 +60,8 @@ impl std::fmt::Debug for Sea {
             .field("datum", datum)
             .field("bounds", bounds)
             .field("time", time)
-            .finish()
+            .field("finest", finest)
+            .finish_non_exhaustive()
     }
 }
 
@@ -78,7 +106,20 @@ impl Sea {
 
     /// Still water at a level (m), to which models of waves may be added, over a datum, which must be a plane.
     pub fn new(datum: Datum, level: f64) -> Sea {
-        Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0 }
+        Sea {
+            models: Vec::new(),
+            level,
+            datum,
+            bounds: Bounds::default(),
+            time: 0.0,
+            finest: Finest::default(),
+            rises: [Rise::default(); OCTAVES],
+        }
+    }
+
+    /// The ripples that are too fine for its models.
+    pub fn finest(&self) -> Finest {
+        self.finest
     }
 
     /// The same with the waves of another model.
@@ -123,6 +164,24 @@ impl Sea {
                 bend: sum.bend + b.bend,
             }
         });
+        // Roughness is about six standard deviations: slopes of 3½ are all but never passed.
+        let length = |octave: usize| SHORTEST * (1u32 << octave) as f32;
+        let rough = |wavelength: f32| self.models.iter().map(|m| m.roughness(wavelength)).sum::<f32>();
+        let mut square = 0.0;
+        let mut above = self.bounds.height;
+        for octave in (0..OCTAVES).rev() {
+            let (below, wavenumber) = (rough(length(octave)), std::f32::consts::TAU / length(octave));
+            // Waves between this length and twice it.
+            square += (above * above - below * below).max(0.0) * (wavenumber * wavenumber) * (3.5f32 / 6.0).powi(2);
+            let slope = square.sqrt().min(self.bounds.slope);
+            self.rises[octave] = Rise { jump: 1.2 * below, slope };
+            above = below;
+        }
+    }
+
+    /// How the surface can be expected to rise: for short distances the first of these is the least, for long ones the last.
+    pub(crate) fn rises(&self) -> &[Rise] {
+        &self.rises
     }
 
     /// Height of the water (m above the datum) at a place (m).
@@ -270,7 +329,11 @@ impl Sea {
         Surface {
             height: self.level + f64::from(m.dz[lane]),
             slope: Vec2::new((c * sx - b * sy) / area, (a * sy - b * sx) / area),
-            hidden: Vec3::new(m.hidden_xx[lane], m.hidden_xy[lane], m.hidden_yy[lane]),
+            hidden: Vec3::new(
+                m.hidden_xx[lane] + self.finest.variance,
+                m.hidden_xy[lane],
+                m.hidden_yy[lane] + self.finest.variance,
+            ),
             foam: m.foam[lane],
             rest: DVec2::new(found.rest.x[lane], found.rest.y[lane]),
             residual: found.residual[lane],
