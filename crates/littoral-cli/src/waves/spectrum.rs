@@ -36,8 +36,8 @@ use std::path::{Path, PathBuf};
   littoral waves spectrum --buoy 41010w2019.txt.gz --record 2019-02-06T00:40 --polar --out rose.png
 
 A buoy's files are NDBC's: any of 41010.data_spec .swdir .swdir2 .swr1 .swr2, or of 41010w2019.txt
-and its like with d, i, j, k; the others are found beside it. The same buoy is a sea state
-everywhere: --sea buoy=41010.data_spec,record=latest,wind=8,from=240.
+and its like with d, i, j, k; the others are found beside it. With words of a sea state beside:
+--sea buoy=41010.data_spec,record=latest,swell=2@12/300.
 
 JSON: f (Hz), S (m²/Hz), directions and spreads (degrees, one for each f); hs (m), tp, tm01, tm02,
 te (s), mean_direction, peak_direction, spread (degrees); source; time for a buoy. Directions are

@@ -262,7 +262,7 @@ impl SeaState {
             Train::Measured(measured) => measured.lowest(),
         };
         let lowest = self.trains.iter().map(lowest).fold(f64::INFINITY, f64::min);
-        (highest > 0.0).then(|| (lowest, 10.0 * highest))
+        (highest > 0.0).then_some((lowest, 10.0 * highest))
     }
 
     /// The n-th moment ∫ fⁿ S df (m² Hzⁿ) between two frequencies (Hz, both above 0).
