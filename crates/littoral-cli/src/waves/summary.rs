@@ -179,6 +179,6 @@ mod tests {
         let expected = 1.0 / (0.04f64 + 0.01 / 6.0).sqrt();
         assert!((summary.tm02.expect("waves") - expected).abs() < 1e-12);
         assert!((summary.mean_direction.expect("a direction") - 180.0).abs() < 1e-9);
-        assert!((summary.spread.expect("a spread") - 1f64.to_degrees()).abs() < 1e-9);
+        assert!((summary.spread.expect("a spread") - 1f64.to_degrees()).abs() < 1e-8);
     }
 }
