@@ -15,6 +15,7 @@ mod render;
 mod sight;
 mod talk;
 mod viewshed;
+mod waves;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -61,6 +62,7 @@ enum Command {
     Profile(profile::Profile),
     Sight(sight::Sight),
     Viewshed(viewshed::Viewshed),
+    Waves(waves::Waves),
     Bench(bench::Bench),
 }
 
@@ -99,6 +101,7 @@ fn main() -> ExitCode {
         Command::Profile(command) => command.run(&mut talk),
         Command::Sight(command) => command.run(&mut talk),
         Command::Viewshed(command) => command.run(&mut talk),
+        Command::Waves(command) => command.run(&mut talk),
         Command::Bench(command) => command.run(&mut talk),
     };
     match done {

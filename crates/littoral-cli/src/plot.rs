@@ -1,4 +1,4 @@
-//! Plots of profiles, as SVG and as PNG.
+//! Plots, as SVG and as PNG: of profiles, and what other commands draw on a [`Canvas`].
 
 use crate::talk::{Failure, tidy};
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont};
@@ -29,22 +29,26 @@ pub fn ending<'a>(file: &Path, allowed: &[&'a str]) -> Result<&'a str, Failure> 
     })
 }
 
+/// Writes a drawing of `size` pixels as `svg` or `png`.
+pub fn save(file: &Path, kind: &str, size: UVec2, draw: &dyn Fn(&mut dyn Canvas)) -> Result<(), Failure> {
+    if kind == "svg" {
+        let mut canvas = Svg::new(size);
+        draw(&mut canvas);
+        let svg = canvas.finish();
+        return Ok(write::whole(file, |sink| sink.write_all(svg.as_bytes()))?);
+    }
+    let failed =
+        |what: &str| Failure::Work(format!("{}: expected to draw a plot, got \"{what}\"; use .svg", file.display()));
+    let mut canvas = Pixels::new(size).map_err(failed)?;
+    draw(&mut canvas);
+    let colours: Vec<[u8; 3]> = canvas.pixmap.pixels().iter().map(|p| [p.red(), p.green(), p.blue()]).collect();
+    Ok(write::png(file, size.x, size.y, PngPixels::Rgb8(&colours), &[])?)
+}
+
 impl Plot {
     /// Writes the plot as `svg` or `png`.
     pub fn write(&self, file: &Path, kind: &str) -> Result<(), Failure> {
-        if kind == "svg" {
-            let mut canvas = Svg::new(self.size);
-            self.draw(&mut canvas);
-            let svg = canvas.finish();
-            return Ok(write::whole(file, |sink| sink.write_all(svg.as_bytes()))?);
-        }
-        let failed = |what: &str| {
-            Failure::Work(format!("{}: expected to draw a plot, got \"{what}\"; use .svg", file.display()))
-        };
-        let mut canvas = Pixels::new(self.size).map_err(failed)?;
-        self.draw(&mut canvas);
-        let colours: Vec<[u8; 3]> = canvas.pixmap.pixels().iter().map(|p| [p.red(), p.green(), p.blue()]).collect();
-        Ok(write::png(file, self.size.x, self.size.y, PngPixels::Rgb8(&colours), &[])?)
+        save(file, kind, self.size, &|canvas| self.draw(canvas))
     }
 
     fn draw(&self, canvas: &mut dyn Canvas) {
@@ -97,27 +101,39 @@ impl Plot {
 }
 
 /// Red, green, blue.
-type Colour = [u8; 3];
-const INK: Colour = [0x33; 3];
-const GREY: Colour = [0x88; 3];
-const LIGHT: Colour = [0xdd; 3];
-const SEA: Colour = [0x2b, 0x6c, 0xa3];
+pub type Colour = [u8; 3];
+/// Text.
+pub const INK: Colour = [0x33; 3];
+/// Axes and lesser text.
+pub const GREY: Colour = [0x88; 3];
+/// Lines behind the data.
+pub const LIGHT: Colour = [0xdd; 3];
+/// Water.
+pub const SEA: Colour = [0x2b, 0x6c, 0xa3];
 const EARTH: Colour = [0x5d, 0x4a, 0x2f];
 const SAND: Colour = [0xc9, 0xbf, 0xa5];
 
 /// Which end of a text lies at its position.
 #[derive(Clone, Copy, PartialEq)]
-enum Anchor {
+pub enum Anchor {
+    /// Its left end.
     Start,
+    /// Its middle.
     Middle,
+    /// Its right end.
     End,
 }
 
 /// What a plot is drawn on. Positions in pixels from the top left corner; texts stand on theirs. Later things lie above
 /// earlier ones, but an area lies below what is there.
-trait Canvas {
+pub trait Canvas {
+    /// A polyline.
     fn line(&mut self, points: &[DVec2], colour: Colour, width: f64);
+    /// A filled polygon below what is there.
     fn area(&mut self, points: &[DVec2], colour: Colour);
+    /// A filled polygon above what is there.
+    fn patch(&mut self, points: &[DVec2], colour: Colour);
+    /// A line of text, its letters `size` pixels high.
     fn text(&mut self, at: DVec2, anchor: Anchor, size: f64, colour: Colour, text: &str);
 }
 
@@ -164,6 +180,10 @@ impl Canvas for Svg {
 
     fn area(&mut self, points: &[DVec2], colour: Colour) {
         let _ = writeln!(self.areas, "<path d=\"{}Z\" fill=\"{}\"/>", Svg::path(points), hex(colour));
+    }
+
+    fn patch(&mut self, points: &[DVec2], colour: Colour) {
+        let _ = writeln!(self.rest, "<path d=\"{}Z\" fill=\"{}\"/>", Svg::path(points), hex(colour));
     }
 
     fn text(&mut self, at: DVec2, anchor: Anchor, size: f64, colour: Colour, text: &str) {
@@ -225,6 +245,12 @@ impl Canvas for Pixels {
         }
     }
 
+    fn patch(&mut self, points: &[DVec2], colour: Colour) {
+        if let Some(path) = Pixels::path(points) {
+            self.pixmap.fill_path(&path, &Pixels::paint(colour), FillRule::Winding, Transform::identity(), None);
+        }
+    }
+
     fn text(&mut self, at: DVec2, anchor: Anchor, size: f64, colour: Colour, text: &str) {
         // An em of `size` pixels, as an SVG's font size.
         let scale =
@@ -264,7 +290,7 @@ impl Canvas for Pixels {
 }
 
 /// About `count` round numbers between two.
-fn ticks(low: f64, high: f64, count: f64) -> Vec<f64> {
+pub fn ticks(low: f64, high: f64, count: f64) -> Vec<f64> {
     let rough = (high - low) / count;
     let power = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&s| s >= rough).unwrap_or(rough);

@@ -39,6 +39,7 @@ mod reduce;
 mod source;
 mod survey;
 pub mod voids;
+pub mod waves;
 mod wkt;
 pub mod write;
 

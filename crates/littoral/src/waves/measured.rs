@@ -96,6 +96,19 @@ impl Measured {
         Entropy::new(band.first, band.second)
     }
 
+    /// The lowest frequency (Hz) above which all energy but a ten-thousandth lies.
+    pub fn lowest(&self) -> f64 {
+        let energy =
+            |pair: &[Band]| 0.5 * (pair[0].density + pair[1].density) * (pair[1].frequency - pair[0].frequency);
+        let all: f64 = self.bands.windows(2).map(energy).sum();
+        let mut below = 0.0;
+        let holds = |pair: &&[Band]| {
+            below += energy(pair);
+            below > 1e-4 * all
+        };
+        self.bands.windows(2).find(holds).map_or(self.bands[0].frequency, |pair| pair[0].frequency)
+    }
+
     /// The frequency that holds most (Hz).
     pub fn peak(&self) -> f64 {
         let most = |a: &&Band, b: &&Band| a.density.total_cmp(&b.density);
@@ -213,6 +226,9 @@ mod tests {
         let sea = Measured::new(vec![band(0.1, 1.0), band(0.2, 3.0)]).expect("fine");
         assert_eq!((sea.density(0.05), sea.density(0.4)), (0.0, 3.0 / 32.0));
         assert!((sea.density(0.15) - 2.0).abs() < 1e-12);
-        assert_eq!(sea.peak(), 0.2);
+        assert_eq!((sea.peak(), sea.lowest()), (0.2, 0.1));
+        let quiet =
+            Measured::new(vec![band(0.02, 0.0), band(0.05, 0.0), band(0.07, 0.5), band(0.2, 3.0)]).expect("fine");
+        assert_eq!(quiet.lowest(), 0.05);
     }
 }

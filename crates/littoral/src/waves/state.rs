@@ -255,10 +255,14 @@ impl SeaState {
 
     /// Lowest and highest frequency (Hz) between which all but a ten-thousandth of the energy lies; `None` for a calm.
     pub fn band(&self) -> Option<(f64, f64)> {
-        let peaks = self.trains.iter().map(Train::peak);
-        let lowest = peaks.clone().fold(f64::INFINITY, f64::min);
-        let highest = peaks.fold(0.0, f64::max);
-        (highest > 0.0).then(|| (0.4 * lowest, 10.0 * highest))
+        let highest = self.trains.iter().map(Train::peak).fold(0.0, f64::max);
+        // A buoy's peak may be that of the sea, with a swell far below.
+        let lowest = |train: &Train| match train {
+            Train::Formula { spectrum, .. } => 0.4 * spectrum.peak,
+            Train::Measured(measured) => measured.lowest(),
+        };
+        let lowest = self.trains.iter().map(lowest).fold(f64::INFINITY, f64::min);
+        (highest > 0.0).then_some((lowest, 10.0 * highest))
     }
 
     /// The n-th moment ∫ fⁿ S df (m² Hzⁿ) between two frequencies (Hz, both above 0).
