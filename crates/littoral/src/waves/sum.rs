@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 /// grow only as fast as such waves lose height.
 const CELL: f64 = 256.0;
 
-/// Farthest coordinate (m) that is told apart: beyond, phases would have lost all their digits.
+/// Farthest coordinate (m): beyond, where phases have lost all their digits, answers are those of the origin.
 const FARTHEST: f64 = 1e12;
 
 /// How many waves' phases are held at once.
@@ -84,10 +84,9 @@ pub(crate) struct Sum {
     /// Short waves first.
     waves: Vec<Pushing>,
     hot: Vec<Hot>,
-    /// Turns per metre.
+    /// Turns per metre, and turns at the origin at the instant, within ±½; filled up to whole eights.
     kx: Vec<f64>,
     ky: Vec<f64>,
-    /// Turns at the origin at this instant.
     turns: Vec<f64>,
     /// Covariances of each wave's slopes, xx, xy, yy, and of those of all waves before each.
     slopes: Vec<[f32; 3]>,
@@ -140,9 +139,9 @@ impl Sum {
         let mut sum = Sum {
             water,
             hot: waves.iter().map(|wave| Hot::new(wave, water)).collect(),
-            kx: waves.iter().map(|w| w.wave.wavenumber.x / TAU).collect(),
-            ky: waves.iter().map(|w| w.wave.wavenumber.y / TAU).collect(),
-            turns: vec![0.0; waves.len()],
+            kx: padded(&waves, |wave| wave.wavenumber.x / TAU),
+            ky: padded(&waves, |wave| wave.wavenumber.y / TAU),
+            turns: padded(&waves, |_| 0.0),
             pushes: waves.iter().any(|w| w.push > 0.0),
             waves,
             slopes,
@@ -153,6 +152,13 @@ impl Sum {
         sum.set_time(0.0);
         Ok(sum)
     }
+}
+
+/// A number of each wave, filled up to whole eights.
+fn padded(waves: &[Pushing], number: impl Fn(&PlaneWave) -> f64) -> Vec<f64> {
+    let mut numbers: Vec<f64> = waves.iter().map(|pushing| number(&pushing.wave)).collect();
+    numbers.resize(waves.len().next_multiple_of(8), 0.0);
+    numbers
 }
 
 impl Hot {
@@ -241,37 +247,37 @@ fn left(length: f32, fineness: f32) -> f32 {
     length.mul_add(fineness, -1.0).clamp(0.0, 1.0)
 }
 
+/// Coordinates as distances from the middles of their cells, and those middles (m); 0 for what is not a number.
+#[inline(always)]
+fn beside_cell(coordinates: &[f64; BLOCK]) -> (Lanes, [f64; BLOCK]) {
+    let (mut beside, mut middle) = ([0f32; BLOCK], [0f64; BLOCK]);
+    for lane in 0..BLOCK {
+        let at = coordinates[lane];
+        let at = if at.abs() <= FARTHEST { at } else { 0.0 };
+        middle[lane] = (at * (1.0 / CELL)).floor() * CELL + 0.5 * CELL;
+        beside[lane] = (at - middle[lane]) as f32;
+    }
+    (beside, middle)
+}
+
 #[inline(always)]
 fn localise(sum: &Sum, points: &Points) -> Local {
-    let mut local = Local {
-        x: [0.0; BLOCK],
-        y: [0.0; BLOCK],
-        cell_x: [0.0; BLOCK],
-        cell_y: [0.0; BLOCK],
-        one_cell: true,
-        fineness: [f32::INFINITY; BLOCK],
-        hidden: 0,
-        whole: 0,
-    };
-    let (mut narrowest, mut widest) = (f32::INFINITY, 0f32);
-    let mut apart = 0u64;
+    let (x, cell_x) = beside_cell(&points.x);
+    let (y, cell_y) = beside_cell(&points.y);
+    let (mut one_cell, mut widest) = (true, 0f32);
     for lane in 0..BLOCK {
-        // Written so that what is not a number becomes a number.
-        let x = points.x[lane].max(-FARTHEST).min(FARTHEST);
-        let y = points.y[lane].max(-FARTHEST).min(FARTHEST);
-        let (cell_x, cell_y) = ((x * (1.0 / CELL)).floor() * CELL + 0.5 * CELL, (y * (1.0 / CELL)).floor() * CELL + 0.5 * CELL);
-        local.x[lane] = (x - cell_x) as f32;
-        local.y[lane] = (y - cell_y) as f32;
-        local.cell_x[lane] = cell_x;
-        local.cell_y[lane] = cell_y;
-        apart |= (cell_x.to_bits() ^ local.cell_x[0].to_bits()) | (cell_y.to_bits() ^ local.cell_y[0].to_bits());
-        let footprint = points.footprint[lane].max(0.0);
-        narrowest = narrowest.min(footprint);
-        widest = widest.max(footprint);
-        local.fineness[lane] = 0.5 / footprint;
+        one_cell &= (cell_x[lane] == cell_x[0]) & (cell_y[lane] == cell_y[0]);
+        widest = widest.max(points.footprint[lane]);
     }
-    local.one_cell = apart == 0;
+    let fineness = [f32::INFINITY; BLOCK];
+    let mut local = Local { x, y, cell_x, cell_y, one_cell, fineness, hidden: 0, whole: 0 };
     if widest > 0.0 {
+        let mut narrowest = widest;
+        for lane in 0..BLOCK {
+            let footprint = points.footprint[lane].max(0.0);
+            narrowest = narrowest.min(footprint);
+            local.fineness[lane] = 0.5 / footprint;
+        }
         local.hidden = sum.hot.partition_point(|hot| left(hot.length, 0.5 / narrowest) == 0.0);
         local.whole = sum.hot.partition_point(|hot| left(hot.length, 0.5 / widest) < 1.0);
     }
@@ -313,25 +319,27 @@ fn add_waves<const WHAT: u8, const ONE_CELL: bool, const FADING: bool>(
     let mut shared = [0f32; CHUNK];
     let mut first = from;
     while first < to {
-        let last = to.min(first + CHUNK);
-        let hot = &sum.hot[first..last];
-        let (kx, ky, turns) = (&sum.kx[first..last], &sum.ky[first..last], &sum.turns[first..last]);
+        let begin = first & !7;
+        let last = to.min(begin + CHUNK);
         if ONE_CELL {
-            let (cell_x, cell_y) = (local.cell_x[0], local.cell_y[0]);
-            for (((shared, kx), ky), turns) in shared.iter_mut().zip(kx).zip(ky).zip(turns) {
-                *shared = phase(*kx, *ky, *turns, cell_x, cell_y);
+            let count = (last - begin).next_multiple_of(8);
+            let (kx, ky) = (&sum.kx[begin..begin + count], &sum.ky[begin..begin + count]);
+            let (turns, shared) = (&sum.turns[begin..begin + count], &mut shared[..count]);
+            for i in 0..count {
+                shared[i] = phase(kx[i], ky[i], turns[i], local.cell_x[0], local.cell_y[0]);
             }
         }
-        for i in 0..hot.len() {
-            let wave = hot[i];
+        let shared = &shared[first - begin..];
+        for ((wave, shared), number) in sum.hot[first..last].iter().zip(shared).zip(first..) {
             let mut own = [0f32; BLOCK];
             if !ONE_CELL {
+                let (kx, ky, turns) = (sum.kx[number], sum.ky[number], sum.turns[number]);
                 for lane in 0..BLOCK {
-                    own[lane] = phase(kx[i], ky[i], turns[i], local.cell_x[lane], local.cell_y[lane]);
+                    own[lane] = phase(kx, ky, turns, local.cell_x[lane], local.cell_y[lane]);
                 }
             }
             for lane in 0..BLOCK {
-                let start = if ONE_CELL { shared[i] } else { own[lane] };
+                let start = if ONE_CELL { *shared } else { own[lane] };
                 let turns = wave.kx.mul_add(x[lane], wave.ky.mul_add(y[lane], start));
                 let r = turns - turns.round_ties_even();
                 let v = r.abs() - 0.25;
@@ -468,11 +476,11 @@ fn add_velocity(sum: &Sum, points: &Points, depths: &[f32; BLOCK], velocity: &mu
         wet[lane] = if deep[lane] <= bed { 1.0 } else { 0.0 };
     }
     for i in local.hidden..sum.hot.len() {
-        let wave = sum.hot[i];
+        let (wave, kx, ky, turns) = (sum.hot[i], sum.kx[i], sum.ky[i], sum.turns[i]);
         for lane in 0..BLOCK {
-            let start = phase(sum.kx[i], sum.ky[i], sum.turns[i], local.cell_x[lane], local.cell_y[lane]);
-            let turns = wave.kx.mul_add(local.x[lane], wave.ky.mul_add(local.y[lane], start));
-            let r = turns - turns.round_ties_even();
+            let start = phase(kx, ky, turns, local.cell_x[lane], local.cell_y[lane]);
+            let all = wave.kx.mul_add(local.x[lane], wave.ky.mul_add(local.y[lane], start));
+            let r = all - all.round_ties_even();
             let v = r.abs() - 0.25;
             let u = v * v;
             let cosine = v * (u + C2).mul_add(u, C1).mul_add(u, C0);
