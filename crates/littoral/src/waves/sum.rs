@@ -510,3 +510,14 @@ fn power_of_two(x: f32) -> f32 {
     let p = p.mul_add(f, 0.240_226_51).mul_add(f, std::f32::consts::LN_2).mul_add(f, 1.0);
     p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23))
 }
+
+/// Cosine and sine of a number of turns within ±10⁶.
+#[inline(always)]
+pub(crate) fn circle(turns: f32) -> (f32, f32) {
+    let r = turns - turns.round_ties_even();
+    let v = r.abs() - 0.25;
+    let u = v * v;
+    let cosine = v * (u + C2).mul_add(u, C1).mul_add(u, C0) * COSINE as f32;
+    let even = (u + S3).mul_add(u, S2).mul_add(u, S1).mul_add(u, S0) * SINE as f32;
+    (cosine, f32::from_bits(even.to_bits() ^ (r.to_bits() & (1 << 31))))
+}
