@@ -499,13 +499,14 @@ fn add_velocity(sum: &Sum, points: &Points, depths: &[f32; BLOCK], velocity: &mu
     add(&mut velocity.z, &z);
 }
 
-/// 2^x for x ≤ 0, to 2·10⁻⁷ of it; 2^−126 for all below.
+/// 2^x for x ≤ 0, to 2·10⁻⁷ of it; not below 2^−126.
 #[inline(always)]
 fn power_of_two(x: f32) -> f32 {
     // Adding this leaves the nearest whole number in the low bits.
     const SHIFT: f32 = 12_582_912.0;
-    let shifted = x.max(-126.0) + SHIFT;
-    let f = x.max(-126.0) - (shifted - SHIFT);
+    let x = x.clamp(-126.0, 0.0);
+    let shifted = x + SHIFT;
+    let f = x - (shifted - SHIFT);
     let p = 0.000_154_035_3_f32.mul_add(f, 0.001_333_355_8).mul_add(f, 0.009_618_129).mul_add(f, 0.055_504_11);
     let p = p.mul_add(f, 0.240_226_51).mul_add(f, std::f32::consts::LN_2).mul_add(f, 1.0);
     p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23))
