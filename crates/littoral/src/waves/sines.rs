@@ -134,6 +134,14 @@ impl WaveModel for Sines {
         self.sum.add_motion(points, motion);
     }
 
+    fn add_displacements(&self, points: &[Points], motions: &mut [Motion]) {
+        self.sum.add_displacements(points, motions);
+    }
+
+    fn add_motions(&self, points: &[Points], motions: &mut [Motion]) {
+        self.sum.add_motions(points, motions);
+    }
+
     fn add_velocity(&self, points: &Points, depths: &[f32; BLOCK], velocity: &mut Velocity) {
         self.sum.add_velocity(points, depths, velocity);
     }
