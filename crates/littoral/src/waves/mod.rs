@@ -31,6 +31,7 @@ pub use sines::{Length, Sine, Sines};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};
 pub use state::{SeaState, Slice, Train, Wind, bearing_from_heading, heading_from_bearing};
+pub use sum::{Grid, GridScratch};
 pub use superposition::Superposition;
 
 /// A number that makes no sense where it was given.

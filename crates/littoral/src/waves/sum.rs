@@ -14,6 +14,10 @@ use glam::DVec2;
 use multiversion::multiversion;
 use std::f64::consts::TAU;
 
+mod grid;
+
+pub use grid::{Grid, GridScratch};
+
 /// Edge of the squares (m) that share a phase in `f64`: within one, phases in `f32` err by less than 10⁻⁶ of a turn for waves above 10 m, and
 /// grow only as fast as such waves lose height.
 const CELL: f64 = 256.0;

@@ -4,7 +4,7 @@
 //! scene based on wave spectrum*, 2009), with the exact dispersion of the water's depth. There is no tile and no period; water moves up and
 //! down only, and each wave is the linear one of G. Airy, 1845.
 
-use super::sum::{Pushing, Sum};
+use super::sum::{Grid, GridScratch, Pushing, Sum};
 use super::{BLOCK, Bounds, Motion, OutOfRange, PlaneWave, Points, SeaState, StillWater, Velocity, WaveModel, components};
 use std::f64::consts::TAU;
 
@@ -61,7 +61,16 @@ impl Superposition {
         Ok(looping)
     }
 
-    /// Its waves, short ones first.
+    /// Heights (m) at all points of a regular grid, row by row northward: those of [`WaveModel::add_displacement`] but for some 10⁻⁶ of the
+    /// waves' amplitudes, several times as fast. Allocates only what `scratch` lacks.
+    ///
+    /// # Panics
+    /// If `heights` are not as many as the grid has points.
+    pub fn fill(&self, grid: &Grid, scratch: &mut GridScratch, heights: &mut [f32]) {
+        self.sum.fill(grid, scratch, heights);
+    }
+
+    /// Its waves, in the order in which they are summed.
     pub fn waves(&self) -> impl Iterator<Item = &PlaneWave> {
         self.sum.waves().iter().map(|pushing| &pushing.wave)
     }
