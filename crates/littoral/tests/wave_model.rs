@@ -73,6 +73,7 @@ fn conforms(model: &mut dyn WaveModel, expected: Expected) {
     displacements_are_those_of_the_motion(model, expected);
     answers_add(model, expected);
     neighbours_do_not_matter(model, expected);
+    many_blocks_are_answered_as_single_ones(model, expected);
     instants_may_come_in_any_order(model, expected);
     bounds_hold(model, expected);
     roughness_bounds_what_footprints_hide(model, expected);
@@ -177,13 +178,15 @@ fn derivatives_are_those_of_the_displacement(model: &mut dyn WaveModel, expected
         model.set_time(seed as f64 * 17.3);
         let points = if seed % 3 == 0 { blurred(expected, seed) } else { places(expected, seed) };
         let here = motion(model, &points);
-        let around = [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|by| displacement(model, &shifted(&points, by * h)));
+        let around =
+            [DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|by| displacement(model, &shifted(&points, by * h)));
         let by = |of: fn(&Motion) -> &[f32; BLOCK], along: usize, lane: usize| {
             let [after, before] = [0, 1].map(|i| f64::from(of(&around[2 * along + i])[lane]));
             (after - before) / (2.0 * h)
         };
         for lane in 0..BLOCK {
-            let found = [here.slope_x, here.slope_y, here.dxx, here.dxy, here.dxy, here.dyy].map(|f| f64::from(f[lane]));
+            let found =
+                [here.slope_x, here.slope_y, here.dxx, here.dxy, here.dxy, here.dyy].map(|f| f64::from(f[lane]));
             let differences = [
                 by(|m| &m.dz, 0, lane),
                 by(|m| &m.dz, 1, lane),
@@ -286,6 +289,24 @@ fn neighbours_do_not_matter(model: &mut dyn WaveModel, expected: Expected) {
     }
 }
 
+fn many_blocks_are_answered_as_single_ones(model: &mut dyn WaveModel, expected: Expected) {
+    model.set_time(-77.0);
+    let near = places(expected, 2);
+    for count in [0, 1, 2, 3, 4, 5, 9] {
+        let blocks = |of: &dyn Fn(u64) -> Points| (0..count).map(of).collect::<Vec<_>>();
+        let neighbours = blocks(&|seed| shifted(&near, DVec2::new(seed as f64, 3.0)));
+        for blocks in [neighbours, blocks(&|seed| places(expected, seed)), blocks(&|seed| blurred(expected, seed))] {
+            let (mut short, mut long) = (vec![Motion::STILL; blocks.len()], vec![Motion::STILL; blocks.len()]);
+            model.add_displacements(&blocks, &mut short);
+            model.add_motions(&blocks, &mut long);
+            for ((points, short), long) in blocks.iter().zip(&short).zip(&long) {
+                assert_eq!(bits(short), bits(&displacement(model, points)));
+                assert_eq!(bits(long), bits(&motion(model, points)));
+            }
+        }
+    }
+}
+
 fn instants_may_come_in_any_order(model: &mut dyn WaveModel, expected: Expected) {
     let times: [f64; 6] = [0.0, 0.016, 5.0, -70.0, 86_400.0, 1e6];
     let points = blurred(expected, 5);
@@ -359,7 +380,8 @@ fn roughness_bounds_what_footprints_hide(model: &mut dyn WaveModel, expected: Ex
         let blunt = blurred(expected, seed);
         let (sharp, full) = (motion(model, &sharp), motion(model, &blunt));
         for lane in 0..BLOCK {
-            let apart = [full.dx[lane] - sharp.dx[lane], full.dy[lane] - sharp.dy[lane], full.dz[lane] - sharp.dz[lane]];
+            let apart =
+                [full.dx[lane] - sharp.dx[lane], full.dy[lane] - sharp.dy[lane], full.dz[lane] - sharp.dz[lane]];
             // A footprint hides all waves up to twice its width, and may fade those up to four times.
             let most = model.roughness(4.0 * blunt.footprint[lane]) * 1.0001 + 1e-5;
             assert!(apart[2].abs() <= most && apart[0].hypot(apart[1]) <= most, "{apart:?} hidden of {most}");
@@ -383,7 +405,9 @@ fn footprints_keep_the_slopes_variance(model: &mut dyn WaveModel, expected: Expe
                     *sum += resolved + hidden;
                 }
                 assert!(footprint > 0.0 || hidden == [0.0; 3], "something is hidden without a footprint");
-                assert!(hidden[0] >= 0.0 && hidden[2] >= 0.0 && hidden[1].powi(2) <= 1.001 * hidden[0] * hidden[2] + 1e-12);
+                assert!(
+                    hidden[0] >= 0.0 && hidden[2] >= 0.0 && hidden[1].powi(2) <= 1.001 * hidden[0] * hidden[2] + 1e-12
+                );
                 count += 1.0;
             }
         }
@@ -473,7 +497,9 @@ fn motion_dies_out_and_keeps_the_volume(model: &mut dyn WaveModel, expected: Exp
             let [north, south] = [h, -h].map(|by| at(DVec2::Y * by, 0.0));
             let [above, below] = [-h, h].map(|by| at(DVec2::ZERO, by));
             for lane in 0..BLOCK {
-                let speed = f64::from(above.x[lane]).powi(2) + f64::from(above.y[lane]).powi(2) + f64::from(above.z[lane]).powi(2);
+                let speed = f64::from(above.x[lane]).powi(2)
+                    + f64::from(above.y[lane]).powi(2)
+                    + f64::from(above.z[lane]).powi(2);
                 speeds.push(speed.sqrt());
                 let by = |after: f32, before: f32| f64::from(after - before) / (2.0 * h);
                 let upward = by(above.z[lane], below.z[lane]);
@@ -529,12 +555,19 @@ fn sines_and_trochoids_conform() {
         Sine { amplitude, length, heading, phase: wavelength, steepness }
     };
     let list = |steepness| {
-        [(1.0, 50.0, 0.3), (0.4, 23.0, -0.4), (0.1, 9.0, 2.0), (0.01, 1.3, -2.8)].map(|(a, l, h)| sine(a, l, h, steepness))
+        [(1.0, 50.0, 0.3), (0.4, 23.0, -0.4), (0.1, 9.0, 2.0), (0.01, 1.3, -2.8)]
+            .map(|(a, l, h)| sine(a, l, h, steepness))
     };
     for (steepness, depth, flowing) in [(0.0, 25.0, false), (1.0, f64::INFINITY, true), (0.7, 5.0, false)] {
         let water = StillWater::of_depth(depth).expect("wet");
         let mut sines = Sines::new(&list(steepness), water).expect("waves");
         conforms(&mut sines, Expected { flowing, scatter: 0.15, ..USUAL });
+        // Several to each heading, which are summed otherwise.
+        let rows: Vec<Sine> = (0..12)
+            .map(|i| sine(0.3, 12.0 + 5.0 * f64::from(i), 0.8 * f64::from(i % 3) - 0.5, 0.6 * steepness))
+            .collect();
+        let mut sines = Sines::new(&rows, water).expect("waves");
+        conforms(&mut sines, Expected { scatter: 0.2, ..USUAL });
     }
 }
 
@@ -571,9 +604,12 @@ fn linear_waves_are_airys_at_any_depth_distance_and_time() {
             let k = TAU / wavelength;
             let omega = (STANDARD_GRAVITY * k * (k * depth).tanh()).sqrt();
             let wavenumber = DVec2::new(0.6, -0.8) * k;
-            let wave = PlaneWave { amplitude: 0.3, wavenumber, angular_frequency: water.angular_frequency(k), phase: 0.5 };
+            let wave =
+                PlaneWave { amplitude: 0.3, wavenumber, angular_frequency: water.angular_frequency(k), phase: 0.5 };
             let mut sea = Superposition::new(&[wave], water).expect("a sea");
-            for (x, y, t) in [(0.0, 0.0, 0.0), (100.0, 40.0, 3.0), (-100_000.0, 70_000.0, 86_400.0), (13.0, -7.5, -5000.0)] {
+            for (x, y, t) in
+                [(0.0, 0.0, 0.0), (100.0, 40.0, 3.0), (-100_000.0, 70_000.0, 86_400.0), (13.0, -7.5, -5000.0)]
+            {
                 sea.set_time(t);
                 let theta = wavenumber.x * x + wavenumber.y * y - omega * t + 0.5;
                 let (points, below) = (Points::at(x, y), 0.3 * depth.min(10.0));
@@ -595,7 +631,10 @@ fn linear_waves_are_airys_at_any_depth_distance_and_time() {
                 ];
                 for (n, (got, wanted, scale)) in expected.into_iter().enumerate() {
                     let error = (f64::from(got) - wanted).abs() / scale;
-                    assert!(error < 6e-5, "{n}: {got} for {wanted} at {x}, {y}, {t}, depth {depth}, length {wavelength}");
+                    assert!(
+                        error < 6e-5,
+                        "{n}: {got} for {wanted} at {x}, {y}, {t}, depth {depth}, length {wavelength}"
+                    );
                 }
             }
             // A crest runs ω / k.
@@ -622,7 +661,8 @@ fn far_away_and_late_the_sum_errs_by_less_than_a_hundredth_of_a_millimetre() {
         let m = displacement(&sea, &points);
         for lane in 0..BLOCK {
             let place = DVec2::new(points.x[lane], points.y[lane]);
-            let height = |w: &PlaneWave| w.amplitude * (w.wavenumber.dot(place) - w.angular_frequency * time + w.phase).cos();
+            let height =
+                |w: &PlaneWave| w.amplitude * (w.wavenumber.dot(place) - w.angular_frequency * time + w.phase).cos();
             let exact: f64 = sea.waves().map(height).sum();
             worst = worst.max((f64::from(m.dz[lane]) - exact).abs());
         }
@@ -644,6 +684,32 @@ fn superpositions_have_the_height_of_their_state() {
     }
     let (height, wanted) = (4.0 * (sum / count).sqrt(), state.significant_height());
     assert!((height / wanted - 1.0).abs() < 0.02, "{height} for {wanted}");
+}
+
+#[test]
+fn heights_in_bulk_are_those_of_blocks() {
+    let lattice = Superposition::of_state(&state(20.0), 16, 8).expect("a sea");
+    let loose: Vec<PlaneWave> = lattice
+        .waves()
+        .enumerate()
+        .map(|(i, wave)| PlaneWave { wavenumber: DVec2::from_angle(i as f64).rotate(wave.wavenumber), ..*wave })
+        .collect();
+    for mut sea in [lattice, Superposition::new(&loose, StillWater::of_depth(20.0).expect("wet")).expect("a sea")] {
+        sea.set_time(500.0);
+        for count in [0, 1, 15, 64, 65, 1000] {
+            // Along a line through several cells, and one place that is none.
+            let place = |i: usize| DVec2::new(-150.0 + 2.3 * i as f64, 0.7 * i as f64);
+            let mut places: Vec<DVec2> = (0..count).map(place).collect();
+            if count > 70 {
+                places[70].x = f64::NAN;
+            }
+            let mut heights = vec![f32::NAN; count];
+            sea.heights_at(&places, &mut heights);
+            for (place, height) in places.iter().zip(&heights) {
+                assert_eq!(displacement(&sea, &Points::at(place.x, place.y)).dz[5], *height);
+            }
+        }
+    }
 }
 
 #[test]

@@ -159,7 +159,8 @@ impl WaveModel for Sines {
 mod tests {
     use super::*;
 
-    const WAVE: Sine = Sine { amplitude: 0.5, length: Length::Wavelength(20.0), heading: 0.4, phase: 0.3, steepness: 1.0 };
+    const WAVE: Sine =
+        Sine { amplitude: 0.5, length: Length::Wavelength(20.0), heading: 0.4, phase: 0.3, steepness: 1.0 };
 
     #[test]
     fn trochoids_do_not_fold() {

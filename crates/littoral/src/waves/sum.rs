@@ -287,6 +287,11 @@ impl Sum {
         add_motions(self, points, motions);
     }
 
+    /// Heights (m) at places; they must not be pushed sideways.
+    pub(crate) fn heights_at(&self, places: &[DVec2], heights: &mut [f32]) {
+        heights_at(self, places, heights);
+    }
+
     pub(crate) fn add_displacement(&self, points: &Points, motion: &mut Motion) {
         add_displacement(self, points, motion);
     }
@@ -334,9 +339,9 @@ fn left(length: f32, fineness: f32) -> f32 {
 
 /// Coordinates as distances from the middles of their cells, and those middles (m); 0 for what is not a number.
 #[inline(always)]
-fn beside_cell(coordinates: &[f64; BLOCK]) -> (Lanes, [f64; BLOCK]) {
-    let (mut beside, mut middle) = ([0f32; BLOCK], [0f64; BLOCK]);
-    for lane in 0..BLOCK {
+fn beside_cell<const W: usize>(coordinates: &[f64; W]) -> ([f32; W], [f64; W]) {
+    let (mut beside, mut middle) = ([0f32; W], [0f64; W]);
+    for lane in 0..W {
         let at = coordinates[lane];
         let at = if at.abs() <= FARTHEST { at } else { 0.0 };
         middle[lane] = (at * (1.0 / CELL)).floor() * CELL + 0.5 * CELL;
@@ -346,18 +351,25 @@ fn beside_cell(coordinates: &[f64; BLOCK]) -> (Lanes, [f64; BLOCK]) {
 }
 
 #[inline(always)]
+fn all_equal<const W: usize>(numbers: &[f64; W]) -> bool {
+    // By bits and without branches.
+    let mut apart = 0;
+    for lane in 0..W {
+        apart |= numbers[lane].to_bits() ^ numbers[0].to_bits();
+    }
+    apart == 0
+}
+
+#[inline(always)]
 fn localise(points: &Points) -> Local<BLOCK> {
     let (x, cell_x) = beside_cell(&points.x);
     let (y, cell_y) = beside_cell(&points.y);
-    // By bits and without branches, so that it takes a few instructions for all lanes.
-    let (mut apart, mut wide) = (0u64, false);
-    for lane in 0..BLOCK {
-        apart |= (cell_x[lane].to_bits() ^ cell_x[0].to_bits()) | (cell_y[lane].to_bits() ^ cell_y[0].to_bits());
-    }
+    let one_cell = all_equal(&cell_x) && all_equal(&cell_y);
+    // Without branches, so that it takes a few instructions for all lanes.
+    let mut wide = false;
     for lane in 0..BLOCK {
         wide |= points.footprint[lane] > 0.0;
     }
-    let one_cell = apart == 0;
     let fineness = [f32::INFINITY; BLOCK];
     let mut local = Local { x, y, cell_x, cell_y, one_cell, fineness, finest: f32::INFINITY, coarsest: f32::INFINITY };
     if wide {
@@ -772,6 +784,36 @@ fn add_hidden(sum: &Sum, fan: &Fan, local: &Local<BLOCK>, motion: &mut Motion) {
     add(&mut motion.hidden_xx, &xx, 0);
     add(&mut motion.hidden_xy, &xy, 0);
     add(&mut motion.hidden_yy, &yy, 0);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn heights_at(sum: &Sum, places: &[DVec2], heights: &mut [f32]) {
+    let mut local = Local::<MANY_HEIGHTS>::ORIGIN;
+    for (places, heights) in places.chunks(MANY_HEIGHTS).zip(heights.chunks_mut(MANY_HEIGHTS)) {
+        // Filled up with the first place.
+        let (mut x, mut y) = ([places[0].x; MANY_HEIGHTS], [places[0].y; MANY_HEIGHTS]);
+        for ((x, y), place) in x.iter_mut().zip(&mut y).zip(places) {
+            (*x, *y) = (place.x, place.y);
+        }
+        let (cell_x, cell_y);
+        (local.x, cell_x) = beside_cell(&x);
+        (local.y, cell_y) = beside_cell(&y);
+        let mut sums = [[0f32; MANY_HEIGHTS]; 1];
+        if all_equal(&cell_x) && all_equal(&cell_y) {
+            (local.cell_x[0], local.cell_y[0]) = (cell_x[0], cell_y[0]);
+            add_all::<MANY_HEIGHTS, 1, HEIGHTS>(sum, &local, &mut sums);
+        } else {
+            for ((x, y), sums) in x.chunks(BLOCK).zip(y.chunks(BLOCK)).zip(sums[0].chunks_mut(BLOCK)) {
+                let mut points = Points::at(0.0, 0.0);
+                points.x.copy_from_slice(x);
+                points.y.copy_from_slice(y);
+                let mut motion = Motion::STILL;
+                add_displacement(sum, &points, &mut motion);
+                sums.copy_from_slice(&motion.dz);
+            }
+        }
+        heights.copy_from_slice(&sums[0][..heights.len()]);
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]

@@ -5,7 +5,10 @@
 //! down only, and each wave is the linear one of G. Airy, 1845.
 
 use super::sum::{Grid, GridScratch, Pushing, Sum};
-use super::{BLOCK, Bounds, Motion, OutOfRange, PlaneWave, Points, SeaState, StillWater, Velocity, WaveModel, components};
+use super::{
+    BLOCK, Bounds, Motion, OutOfRange, PlaneWave, Points, SeaState, StillWater, Velocity, WaveModel, components,
+};
+use glam::DVec2;
 use std::f64::consts::TAU;
 
 /// A sea of plane waves, each on its own way.
@@ -59,6 +62,12 @@ impl Superposition {
         let mut looping = Superposition { sum, period, time: 0.0 };
         looping.set_time(self.time);
         Ok(looping)
+    }
+
+    /// Heights (m) at places (m), to the bit those of [`WaveModel::add_displacement`]: fastest where places that follow each other are near each
+    /// other. As many are answered as the shorter slice has.
+    pub fn heights_at(&self, places: &[DVec2], heights: &mut [f32]) {
+        self.sum.heights_at(places, heights);
     }
 
     /// Heights (m) at all points of a regular grid, row by row northward: those of [`WaveModel::add_displacement`] but for some 10⁻⁶ of the

@@ -118,17 +118,35 @@ fn add_rows(
 ) {
     let waves = scratch.rows.len();
     for (block, columns) in scratch.columns.chunks_exact(waves).enumerate() {
-        let (mut even, mut odd) = ([[0f32; BLOCK]; ROWS], [[0f32; BLOCK]; ROWS]);
+        // Sixteen accumulators by name, so that each is seen to be a register.
+        let ([mut e0, mut e1, mut e2, mut e3], [mut e4, mut e5, mut e6, mut e7]) =
+            ([[0f32; BLOCK]; 4], [[0f32; BLOCK]; 4]);
+        let ([mut o0, mut o1, mut o2, mut o3], [mut o4, mut o5, mut o6, mut o7]) =
+            ([[0f32; BLOCK]; 4], [[0f32; BLOCK]; 4]);
         for (rows, [cosines, sines]) in scratch.rows.iter().zip(columns) {
             let across: &[f32; ROWS] = rows[0][turned..turned + ROWS].try_into().expect("as many");
             let up: &[f32; ROWS] = rows[1][turned..turned + ROWS].try_into().expect("as many");
-            for r in 0..ROWS {
-                for lane in 0..BLOCK {
-                    even[r][lane] = across[r].mul_add(cosines[lane], even[r][lane]);
-                    odd[r][lane] = up[r].mul_add(sines[lane], odd[r][lane]);
-                }
+            for lane in 0..BLOCK {
+                let (cosine, sine) = (cosines[lane], sines[lane]);
+                e0[lane] = across[0].mul_add(cosine, e0[lane]);
+                e1[lane] = across[1].mul_add(cosine, e1[lane]);
+                e2[lane] = across[2].mul_add(cosine, e2[lane]);
+                e3[lane] = across[3].mul_add(cosine, e3[lane]);
+                e4[lane] = across[4].mul_add(cosine, e4[lane]);
+                e5[lane] = across[5].mul_add(cosine, e5[lane]);
+                e6[lane] = across[6].mul_add(cosine, e6[lane]);
+                e7[lane] = across[7].mul_add(cosine, e7[lane]);
+                o0[lane] = up[0].mul_add(sine, o0[lane]);
+                o1[lane] = up[1].mul_add(sine, o1[lane]);
+                o2[lane] = up[2].mul_add(sine, o2[lane]);
+                o3[lane] = up[3].mul_add(sine, o3[lane]);
+                o4[lane] = up[4].mul_add(sine, o4[lane]);
+                o5[lane] = up[5].mul_add(sine, o5[lane]);
+                o6[lane] = up[6].mul_add(sine, o6[lane]);
+                o7[lane] = up[7].mul_add(sine, o7[lane]);
             }
         }
+        let (even, odd) = ([e0, e1, e2, e3, e4, e5, e6, e7], [o0, o1, o2, o3, o4, o5, o6, o7]);
         let beside = (half - block * BLOCK).min(BLOCK);
         let (right, left) = (start + half + block * BLOCK, start + half - block * BLOCK);
         for r in 0..ROWS.min(grid.rows - row) {
