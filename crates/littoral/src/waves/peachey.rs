@@ -376,10 +376,13 @@ impl Train {
         let incoming = number(deep, offshore);
         // Nodes cannot hold waves shorter than four of them; on land, which has none, that is as good as any.
         let most = (TAU / (4.0 * bed.spacing)).max(2.0 * incoming);
-        let numbers: Vec<f64> = (0..bed.depths.len())
-            .map(|node| bed.depth(node))
-            .map(|depth| if depth > 0.0 { number(deep, depth).min(most) } else { most })
-            .collect();
+        let of_depth = |number: fn(f64, f64) -> f64| -> Vec<f64> {
+            let at = |node| (bed.depth(node) > 0.0).then(|| number(deep, bed.depth(node)));
+            (0..bed.depths.len()).map(|node| at(node).unwrap_or(most)).collect()
+        };
+        let exact = of_depth(wavenumber);
+        let mut numbers = if path == Path::Refracted { exact.clone() } else { of_depth(number) };
+        numbers.iter_mut().for_each(|number| *number = number.min(most));
         let heading = DVec2::new(libm::cos(heading), libm::sin(heading));
         let course = eikonal::Course::new(bed, heading, incoming, &numbers);
         let phases = match path {
@@ -394,7 +397,7 @@ impl Train {
         let node = |node: usize| {
             let (depth, k) = (bed.depth(node), numbers[node]);
             let wet = depth > 0.0 && phases.reached[node];
-            let shoal = if wet && shoaling { sqrt(flux / group(depth, wavenumber(deep, depth))) } else { 1.0 };
+            let shoal = if wet && shoaling { sqrt(flux / group(depth, exact[node])) } else { 1.0 };
             // Depth over wavelength, from the limit of the deep to that of the shallow.
             let shore = ((0.25 - depth * k / TAU) / 0.2).clamp(0.0, 1.0);
             Node {
@@ -411,16 +414,20 @@ impl Train {
     }
 
     fn measure_roughness(&mut self) {
-        let mut rough = [0f64; THRESHOLDS];
+        // Greatest heights, and those of creases, of waves up to each threshold and longer than the one before.
+        let mut own = [[0f64; 2]; THRESHOLDS];
         for node in self.nodes.iter().filter(|node| node.amplitude > 0.0) {
             let (a, s) = (f64::from(node.amplitude), f64::from(node.shore));
             let length = TAU / f64::from(node.wavenumber);
-            let own = libm::ceil(4.0 * libm::log2(length * 1e3)).clamp(0.0, THRESHOLDS as f64 - 1.0) as usize;
-            rough[own] = rough[own].max(a);
-            // The n-th part of a crease is 8 / (π n)² high and its length over n long; those from n on, less than 8 / π² / (n − ½) together.
-            for (index, rough) in rough.iter_mut().enumerate().take(own) {
-                let n = (length / threshold(index)).floor() + 1.0;
-                *rough = rough.max(a * s * (8.0 / (PI * PI * (n - 0.5))).min(1.0));
+            let own = &mut own[libm::ceil(4.0 * libm::log2(length * 1e3)).clamp(0.0, THRESHOLDS as f64 - 1.0) as usize];
+            *own = [own[0].max(a), own[1].max(a * s)];
+        }
+        let mut rough = own.map(|own| own[0]);
+        for (longer, [_, crease]) in own.iter().enumerate() {
+            for (index, rough) in rough.iter_mut().enumerate().take(longer) {
+                // The n-th part of a crease is 8 / (π n)² high and its length over n long; those from n on, less than 8 / π² / (n − ½) together.
+                let n = (threshold(longer.saturating_sub(1)) / threshold(index)).max(1.0);
+                *rough = rough.max(crease * (8.0 / (PI * PI * (n - 0.5))).min(1.0));
             }
         }
         let mut most = 0.0;
@@ -472,7 +479,8 @@ impl WaveModel for Peachey {
                 let (w, by_cycles, by_shore) = profile(here.cycles[0], shore);
                 up[lane] += amplitude * left * w;
                 let tilt = |phase: f32, by_amplitude: f32, by_left: f32, shored: f32| {
-                    (by_amplitude * left + amplitude * by_left) * w + amplitude * left * (by_cycles * phase + by_shore * shored)
+                    (by_amplitude * left + amplitude * by_left) * w
+                        + amplitude * left * (by_cycles * phase + by_shore * shored)
                 };
                 tilt_x[lane] += tilt(x, amplitude_x, left_by[0], shore_x);
                 tilt_y[lane] += tilt(y, amplitude_y, left_by[1], shore_y);
@@ -525,7 +533,8 @@ impl WaveModel for Peachey {
         if wavelength <= first {
             return self.trains.iter().map(|train| train.rough[0]).sum::<f32>() * (wavelength / first).max(0.0);
         }
-        let index = libm::ceil(4.0 * libm::log2(f64::from(wavelength) * 1e3)).clamp(0.0, THRESHOLDS as f64 - 1.0) as usize;
+        let index =
+            libm::ceil(4.0 * libm::log2(f64::from(wavelength) * 1e3)).clamp(0.0, THRESHOLDS as f64 - 1.0) as usize;
         self.trains.iter().map(|train| train.rough[index]).sum()
     }
 }

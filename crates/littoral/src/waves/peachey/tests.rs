@@ -47,7 +47,11 @@ fn crests_turn_as_snell_says() {
             let here = waves.at(train, x, y);
             let k = wavenumber(deep, 0.02 * -y.min(0.0).max(-1000.0)) / TAU;
             // sin α over the phase speed is constant, and the wave as long as the depth wants it.
-            assert!((here.cycles[1] - kept).abs() < 0.01 * kept.abs() + 1e-6, "{heading}: {x}, {y}: {} {kept}", here.cycles[1]);
+            assert!(
+                (here.cycles[1] - kept).abs() < 0.01 * kept.abs() + 1e-6,
+                "{heading}: {x}, {y}: {} {kept}",
+                here.cycles[1]
+            );
             let length = sqrt(here.cycles[1].powi(2) + here.cycles[2].powi(2));
             assert!((length / k - 1.0).abs() < 0.01, "{heading}: {x}, {y}: {length} {k}");
         }
@@ -60,8 +64,7 @@ fn straight_rays_add_up_the_wave_number() {
     let deep = TAU * TAU / 64.0 / STANDARD_GRAVITY;
     let incoming = rough_wavenumber(deep, 20.0) / TAU;
     for heading in [0.5, 1.0, PI / 2.0] {
-        let waves =
-            Peachey::new(&bed, &[Swell { heading, ..SWELL }], Path::Straight, Surf::default()).expect("waves");
+        let waves = Peachey::new(&bed, &[Swell { heading, ..SWELL }], Path::Straight, Surf::default()).expect("waves");
         let train = &waves.trains[0];
         let (sin, cos) = (heading.sin(), heading.cos());
         for i in 0..20 {
