@@ -5,7 +5,7 @@
 //! [`littoral::field::Raster`] with a [`Georeference`], at a resolution that fits the memory asked for.
 //!
 //! ```no_run
-//! use littoral::{field::Land, picture, picture::{Scene, Settings, Water}, space::Ray};
+//! use littoral::{field::{Land, Water}, picture, picture::{Scene, Settings}, space::Ray};
 //! use littoral_data::{LoadOptions, load};
 //!
 //! let dem = load("dem.tif".as_ref(), LoadOptions { most_samples: 4 << 20 })?;

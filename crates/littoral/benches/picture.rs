@@ -4,8 +4,8 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::UVec2;
-use littoral::field::coast;
-use littoral::picture::{Display, Scene, Settings, Shot, Stage, Style, Water, coast_shot, compose, overhead};
+use littoral::field::{Water, coast};
+use littoral::picture::{Display, Scene, Settings, Shot, Stage, Style, coast_shot, compose, overhead};
 use std::time::Duration;
 
 fn pictures(criterion: &mut Criterion) {

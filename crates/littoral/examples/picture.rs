@@ -8,8 +8,8 @@
 //! ```
 
 use glam::{DVec2, DVec3, UVec2};
-use littoral::field::{Land, Raster, coast};
-use littoral::picture::{Display, Scene, Settings, Stage, Style, Sun, Water, coast_shot, compose, overhead};
+use littoral::field::{Land, Raster, Water, coast};
+use littoral::picture::{Display, Scene, Settings, Stage, Style, Sun, coast_shot, compose, overhead};
 use littoral::space::View;
 use std::collections::HashMap;
 use std::time::Instant;

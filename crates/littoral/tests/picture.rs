@@ -3,10 +3,10 @@
 
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::noise::Fbm;
-use littoral::field::{Land, Raster, coast};
+use littoral::field::{Land, Raster, Water, coast};
 use littoral::picture::{
-    Border, Display, Drape, Picture, Scene, Settings, Shot, Stage, Style, Texture, Water, coast_shot, compose,
-    overhead, render,
+    Border, Display, Drape, Picture, Scene, Settings, Shot, Stage, Style, Texture, coast_shot, compose, overhead,
+    render,
 };
 use littoral::space::{Ray, View};
 use proptest::prelude::*;

@@ -348,7 +348,7 @@ fn bounds_hold(model: &mut dyn WaveModel, expected: Expected) {
                 sideways: most.sideways.max(sideways),
                 slope: most.slope.max(slope),
                 stretch: most.stretch.max(stretch),
-                curvature: 0.0,
+                ..Bounds::default()
             };
         }
         if bounds.curvature.is_finite() {
@@ -359,6 +359,10 @@ fn bounds_hold(model: &mut dyn WaveModel, expected: Expected) {
                 let curvature = f64::from(tilted.slope_x[lane] - m.slope_x[lane]).abs() / h;
                 let noise = 1e-6 * f64::from(bounds.slope) / h;
                 assert!(curvature <= f64::from(bounds.curvature) + noise, "curvature {curvature} of {bounds:?}");
+                let bend =
+                    f64::from(tilted.dxx[lane] - m.dxx[lane]).hypot(f64::from(tilted.dxy[lane] - m.dxy[lane])) / h;
+                let noise = 1e-6 * f64::from(bounds.stretch) / h;
+                assert!(bend <= f64::from(bounds.bend) + noise, "bend {bend} of {bounds:?}");
             }
         }
     }

@@ -10,12 +10,16 @@ mod land;
 pub mod noise;
 mod pyramid;
 mod raster;
+mod sea;
+mod water;
 
 pub(crate) use blocks::{BLOCK_LEVELS, Block, Blocks};
 pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
+pub use sea::{Finest, Sea, Surface};
+pub use water::Water;
 
 use crate::space::{Cell, Datum, Place};
 

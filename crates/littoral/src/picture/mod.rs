@@ -31,15 +31,14 @@ mod spectrum;
 mod stage;
 mod texture;
 mod tile;
-mod water;
+mod waves;
 
 pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
 pub use display::{Display, Exposure, Medium, Picture};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
-pub use water::Water;
 
-use crate::field::Land;
+use crate::field::{Land, Sea, Water};
 use crate::space::View;
 use glam::DVec3;
 
@@ -48,8 +47,10 @@ use glam::DVec3;
 pub struct Scene<'a> {
     /// The ground.
     pub land: &'a Land,
-    /// Still water over it, if any.
+    /// Where water lies over it, if any does.
     pub water: Option<&'a Water>,
+    /// The waves on that water, of which the level is the same; without them there is a light air over still water.
+    pub sea: Option<&'a Sea>,
     /// The sun.
     pub sun: Sun,
     /// The air between things and the eye.
@@ -73,6 +74,7 @@ impl<'a> Scene<'a> {
         Scene {
             land,
             water,
+            sea: None,
             sun: Sun::new(240f64.to_radians(), 25f64.to_radians()),
             air: Air::default(),
             style: Style::Natural,

@@ -95,13 +95,125 @@ pub fn refract(direction: Vec3, normal: Vec3) -> Vec3 {
     direction / INDEX + normal * (cosine / INDEX - k.max(0.0).sqrt())
 }
 
-/// Ripples at a place.
+/// Ripples and waves at a place.
 #[derive(Clone, Copy, Debug)]
 pub struct Ripples {
     /// Slope of those a pixel can show.
     pub slope: Vec2,
-    /// Variance, in each direction, of the slopes of those it cannot.
-    pub variance: f32,
+    /// Covariances (xx, xy, yy) of the slopes of those it cannot: normally distributed (C. Cox and W. Munk 1954).
+    pub hidden: Vec3,
+}
+
+impl Ripples {
+    /// The distribution of slopes along a horizontal unit direction: mean and standard deviation.
+    fn along(&self, direction: Vec2) -> (f32, f32) {
+        let Vec3 { x: xx, y: xy, z: yy } = self.hidden;
+        let square =
+            xx * direction.x * direction.x + 2.0 * xy * direction.x * direction.y + yy * direction.y * direction.y;
+        (self.slope.dot(direction), square.max(1e-8).sqrt())
+    }
+
+    /// Area of the facets turned towards a unit direction, as seen from there, per area of still water: ∫ (v·n / n_z)⁺ over the slopes.
+    pub fn seen_from(&self, eye: Vec3) -> f32 {
+        let (flat, along) = flat_of(eye);
+        let (mean, deviation) = self.along(along);
+        let above = eye.z - flat * mean;
+        let spread = (flat * deviation).max(1e-6);
+        above * below(above / spread) + spread * bell(above / spread)
+    }
+
+    /// A slope drawn from those turned towards a unit direction, each as often as its area is seen from there (E. Heitz and E. d'Eon,
+    /// "Importance sampling microfacet-based BSDFs using the distribution of visible normals", 2014), for two normal numbers.
+    pub fn seen_slope(&self, eye: Vec3, random: Vec2) -> Vec2 {
+        let (flat, along) = flat_of(eye);
+        let across = along.perp();
+        let (mean, deviation) = self.along(along);
+        // In deviations: facets with p < edge face the eye, and their area goes with edge - p.
+        let edge = ((eye.z - flat * mean) / (flat * deviation).max(1e-6)).clamp(-6.0, 1e4);
+        let whole = edge * below(edge) + bell(edge);
+        let wanted = below(random.x) * whole;
+        let (mut low, mut high) = (-7.0f32, edge.min(7.0));
+        let mut p = random.x.clamp(low, high);
+        for _ in 0..8 {
+            let off = edge * below(p) + bell(p) - wanted;
+            if off > 0.0 {
+                high = p
+            } else {
+                low = p
+            }
+            let slope = (edge - p) * bell(p);
+            let next = p - off / slope.max(1e-9);
+            p = if next > low && next < high { next } else { 0.5 * (low + high) };
+        }
+        // The other component follows the first where they are correlated.
+        let Vec3 { x: xx, y: xy, z: yy } = self.hidden;
+        let covariance = along.x * (xx * across.x + xy * across.y) + along.y * (xy * across.x + yy * across.y);
+        let (across_mean, across_deviation) = self.along(across);
+        let follow = covariance / deviation;
+        let left = (across_deviation * across_deviation - follow * follow).max(0.0).sqrt();
+        along * (mean + deviation * p) + across * (across_mean + follow * p + left * random.y)
+    }
+
+    /// Density of a slope.
+    fn density(&self, slope: Vec2) -> f32 {
+        let Vec3 { x: xx, y: xy, z: yy } = self.hidden;
+        let area = (xx * yy - xy * xy).max(1e-12);
+        let d = slope - self.slope;
+        let exponent = (yy * d.x * d.x - 2.0 * xy * d.x * d.y + xx * d.y * d.y) / area;
+        (-0.5 * exponent).exp() / (2.0 * std::f32::consts::PI * area.sqrt())
+    }
+}
+
+/// Length and direction of the horizontal part.
+fn flat_of(v: Vec3) -> (f32, Vec2) {
+    let flat = v.truncate();
+    (flat.length(), flat.normalize_or(Vec2::X))
+}
+
+/// The normal distribution's density.
+fn bell(x: f32) -> f32 {
+    0.398_942_3 * (-0.5 * x * x).exp()
+}
+
+/// The x with a share of the normal distribution below it: the inverse of [`below`], to 5e-4 (Abramowitz and Stegun 26.2.23).
+fn quantile(share: f32) -> f32 {
+    let p = share.clamp(1e-6, 1.0 - 1e-6);
+    let t = (-2.0 * p.min(1.0 - p).ln()).sqrt();
+    let x =
+        t - (2.515_517 + t * (0.802_853 + t * 0.010_328)) / (1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308)));
+    if p < 0.5 { -x } else { x }
+}
+
+/// How much of a pixel of a footprint (m) is white where `cover` of the water about it is foam: a lace of strands and holes, carried by the water
+/// that rests at a place (m). In the mean over places it is `cover`.
+pub fn lace(rest: DVec2, footprint: f32, cover: f32) -> f32 {
+    if cover <= 0.002 {
+        return 0.0;
+    }
+    // Octaves of noise with their wavelengths and shares of the variance; what a pixel cannot show is normally distributed.
+    const OCTAVES: [(f32, f32); 6] = [(5.3, 0.16), (1.9, 0.24), (0.83, 0.24), (0.37, 0.18), (0.16, 0.11), (0.07, 0.07)];
+    // Mean square of the noise.
+    const NOISE: f32 = 0.074;
+    let (mut sum, mut left) = (0.0, 1.0f32);
+    for (i, (wavelength, share)) in OCTAVES.into_iter().enumerate() {
+        let shown = resolved(wavelength, footprint);
+        if shown == 0.0 {
+            break;
+        }
+        let turned = DVec2::from_angle(1.1 * i as f64).rotate(rest);
+        sum += patch(turned.extend(0.31), wavelength, footprint, 70 + i as u32) * (share / NOISE).sqrt();
+        left -= share * shown * shown;
+    }
+    below((sum - quantile(1.0 - cover)) / left.max(0.006).sqrt())
+}
+
+/// Share of the normal distribution below x, to 1e-7 (M. Abramowitz and I. Stegun, *Handbook of mathematical functions*, 1964, 26.2.17).
+fn below(x: f32) -> f32 {
+    let tail = |x: f32| {
+        let t = 1.0 / (1.0 + 0.231_641_9 * x);
+        bell(x) * t * (0.319_381_53 + t * (-0.356_563_78 + t * (1.781_477_9 + t * (-1.821_255_9 + t * 1.330_274_4))))
+    };
+    if x < 0.0 { tail(-x) } else { 1.0 - tail(x) }
 }
 
 /// The ripples of a light air at a world position (m), for a pixel of this footprint (m).
@@ -132,7 +244,7 @@ pub fn ripples(at: DVec2, footprint: f32) -> Ripples {
         variance += 0.45 * (amplitude * amplitude) * (1.0 - share * share);
         wavelength *= 0.53;
     }
-    Ripples { slope, variance }
+    Ripples { slope, hidden: Vec3::new(variance, 0.0, variance) }
 }
 
 /// Radiance of the sun's glitter per unit of sunlight on a facing surface (1/sr): Cox and Munk. All vectors unit, `eye` and `sun`
@@ -142,10 +254,10 @@ pub fn glitter(eye: Vec3, sun: Vec3, ripples: &Ripples) -> f32 {
     if half.z < 0.05 {
         return 0.0;
     }
-    let slope = Vec2::new(-half.x, -half.y) / half.z - ripples.slope;
-    let density =
-        (-0.5 * slope.length_squared() / ripples.variance).exp() / (2.0 * std::f32::consts::PI * ripples.variance);
-    fresnel(eye.dot(half)) * density / (4.0 * eye.z.max(0.03) * half.z.powi(4))
+    let density = ripples.density(Vec2::new(-half.x, -half.y) / half.z);
+    // Of the facets turned to the eye, those the sun sees too.
+    let lit = (sun.z / ripples.seen_from(sun).max(1e-4)).clamp(0.0, 1.0);
+    fresnel(eye.dot(half)) * density * lit / (4.0 * ripples.seen_from(eye).max(1e-3) * half.z.powi(4))
 }
 
 #[cfg(test)]
@@ -193,7 +305,7 @@ mod tests {
     fn glitter_sends_back_what_fresnel_mirrors() {
         // Smooth water, sun and eye high: ∫ L cosθ dω over all eyes = Fresnel's share of the sunlight, at its incidence.
         let sun = Vec3::new(0.3, 0.0, (1.0f32 - 0.09).sqrt());
-        let calm = Ripples { slope: Vec2::ZERO, variance: 0.002 };
+        let calm = Ripples { slope: Vec2::ZERO, hidden: Vec3::new(0.002, 0.0, 0.002) };
         let (n, mut sum) = (900, 0.0);
         for i in 0..n {
             for j in 0..n {
@@ -207,5 +319,58 @@ mod tests {
         }
         let expected = fresnel(sun.z) * sun.z;
         assert!((sum / expected - 1.0).abs() < 0.03, "{sum} for {expected}");
+    }
+
+    #[test]
+    fn slopes_are_drawn_as_their_facets_are_seen() {
+        let ripples = Ripples { slope: Vec2::new(0.05, -0.1), hidden: Vec3::new(0.03, 0.01, 0.02) };
+        for eye in [Vec3::new(0.99, 0.1, 0.08), Vec3::new(-0.3, 0.7, 0.4), Vec3::new(0.01, 0.0, 1.0)] {
+            let eye = eye.normalize();
+            // By brute force over a lattice of slopes.
+            let (n, mut area, mut mean) = (400, 0.0f64, glam::DVec2::ZERO);
+            for i in 0..n * n {
+                let s = Vec2::new((i % n) as f32, (i / n) as f32) / n as f32 * 2.4 - 1.2;
+                let facing = (eye.z - eye.truncate().dot(s)).max(0.0) * ripples.density(s) * (2.4 / n as f32).powi(2);
+                area += f64::from(facing);
+                mean += s.as_dvec2() * f64::from(facing);
+            }
+            mean /= area;
+            assert!((f64::from(ripples.seen_from(eye)) / area - 1.0).abs() < 5e-3, "{eye}");
+            // The sampled mean, over a lattice of quantiles.
+            let quantile = |i: i32| {
+                let (mut low, mut high) = (-6.0f32, 6.0f32);
+                for _ in 0..40 {
+                    let middle = 0.5 * (low + high);
+                    if below(middle) < (i as f32 + 0.5) / 60.0 { low = middle } else { high = middle }
+                }
+                low
+            };
+            let points: Vec<f32> = (0..60).map(quantile).collect();
+            let mut drawn = glam::DVec2::ZERO;
+            for x in &points {
+                for y in &points {
+                    let s = ripples.seen_slope(eye, Vec2::new(*x, *y));
+                    assert!(eye.z - eye.truncate().dot(s) > -1e-3, "{s} is turned away");
+                    drawn += s.as_dvec2() / 3600.0;
+                }
+            }
+            assert!((drawn - mean).length() < 4e-3, "{eye}: {drawn} for {mean}");
+        }
+    }
+
+    #[test]
+    fn lace_covers_as_much_as_it_should() {
+        for cover in [0.03, 0.2, 0.6] {
+            for footprint in [0.01, 0.3, 3.0] {
+                let n = 160;
+                let place = |i: i32| DVec2::new(f64::from(i % n) * 0.731, f64::from(i / n) * 0.593);
+                let sum: f32 = (0..n * n).map(|i| lace(place(i), footprint, cover)).sum();
+                let mean = sum / (n * n) as f32;
+                assert!((mean - cover).abs() < 0.015 + 0.06 * cover, "{cover} at {footprint}: {mean}");
+            }
+        }
+        for share in [0.001, 0.1, 0.5, 0.93] {
+            assert!((below(quantile(share)) - share).abs() < 5e-4);
+        }
     }
 }

@@ -8,10 +8,11 @@ use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, Site, natural};
 use super::sampler::Pattern;
-use super::sea::{Ripples, fresnel, glitter, refract, ripples};
+use super::sea::{Ripples, fresnel, glitter, lace, refract, ripples};
 use super::skylight::irradiance;
 use super::stage::{HIGHEST_EYE, Lens, Stage};
 use super::tile::FIRST;
+use super::waves::Wet;
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -29,6 +30,8 @@ pub enum Ahead {
     Water {
         /// Where (m).
         position: DVec3,
+        /// Its waves, where it is not still.
+        wet: Option<Wet>,
     },
     /// The ground.
     Ground {
@@ -158,7 +161,7 @@ impl Stage<'_> {
                 return Shaded { light, through: Vec3::ONE, sky: true, ..Shaded::default() };
             }
             Ahead::Mist { position }
-            | Ahead::Water { position }
+            | Ahead::Water { position, .. }
             | Ahead::Ground { position }
             | Ahead::Floor { position }
             | Ahead::Wall(Wall { position, .. }) => position,
@@ -166,7 +169,7 @@ impl Stage<'_> {
         let distance = (position - lens.eye).length() as f32;
         let look = Look { direction, position, distance, pattern, index };
         let mut shaded = match ahead {
-            Ahead::Water { .. } => self.water(lens, &look, near),
+            Ahead::Water { wet, .. } => self.water(lens, &look, wet.as_ref(), near),
             Ahead::Ground { .. } => self.ground(lens, &look, near),
             Ahead::Wall(wall) => self.cut(lens, direction, wall, self.to_sun(pattern, index)),
             Ahead::Floor { .. } => self.floor(lens, position, self.to_sun(pattern, index)),
@@ -206,7 +209,7 @@ impl Stage<'_> {
 
     /// Width of a pixel at a distance on something whose normal makes this cosine with the eye (m). Slanted pixels are long; the samples
     /// within them see to that in part.
-    fn footprint(&self, lens: &Lens, distance: f32, cosine: f32) -> f32 {
+    pub(super) fn footprint(&self, lens: &Lens, distance: f32, cosine: f32) -> f32 {
         (distance * lens.pixel * (1.0 / cosine.max(0.02)).sqrt() * 0.65).max(1e-4)
     }
 
@@ -301,13 +304,14 @@ impl Stage<'_> {
         natural(&site, surface, &broad, &self.scene.climate)
     }
 
-    fn water(&self, lens: &Lens, look: &Look, near: &mut Near) -> Shaded {
+    fn water(&self, lens: &Lens, look: &Look, wet: Option<&Wet>, near: &mut Near) -> Shaded {
         let Look { direction, position, distance, pattern, index } = *look;
         let eye = -direction;
-        let pool = near.water.take(distance, 0.02, shared(index), || self.pool(lens, direction, position, distance));
-        let slope = pool.ripples.slope + pool.ripples.variance.sqrt() * pattern.ripple(index);
-        let facet = normal_of_slope(slope);
-        let facet = if facet.dot(eye) > 0.02 { facet } else { Vec3::Z };
+        let pool =
+            near.water.take(distance, 0.02, shared(index), || self.pool(lens, direction, position, distance, wet));
+        let ripples = wet.map_or(pool.ripples, Wet::ripples);
+        let facet = normal_of_slope(ripples.seen_slope(eye, pattern.ripple(index)));
+        let facet = if facet.dot(eye) > 0.0 { facet } else { Vec3::Z };
         let share = fresnel(facet.dot(eye));
         let mut mirrored = 2.0 * facet.dot(eye) * facet - eye;
         // A ray thrown down into the next ripple comes up again, a little higher.
@@ -323,9 +327,11 @@ impl Stage<'_> {
             ..Shaded::default()
         };
         if self.sun.z > 0.0 {
-            shaded.sunlit =
-                pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &pool.ripples) * film);
+            shaded.sunlit = pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &ripples) * film);
             shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
+        }
+        if let Some(wet) = wet.filter(|w| w.foam > 0.0) {
+            self.froth(&mut shaded, wet, self.footprint(lens, distance, eye.z));
         }
         if pool.open < 1.0 {
             shaded.light = self.mist.lerp(shaded.light, pool.open);
@@ -333,6 +339,22 @@ impl Stage<'_> {
             shaded.mirror_share *= pool.open;
         }
         shaded
+    }
+
+    /// Covers water with its foam.
+    fn froth(&self, shaded: &mut Shaded, wet: &Wet, footprint: f32) {
+        /// What fresh foam throws back (C. Whitlock, D. Bartlett, E. Gurganus 1982, beyond the blue).
+        const WHITE: Vec3 = Vec3::new(0.58, 0.60, 0.62);
+        let white = lace(wet.rest, footprint, wet.foam);
+        if white <= 0.0 {
+            return;
+        }
+        let normal = normal_of_slope(wet.slope);
+        let sky = irradiance(&self.skylight.open, normal);
+        let sun = self.air.sunlight(0.0) * normal.dot(self.sun).max(0.0);
+        shaded.light = shaded.light.lerp(WHITE / PI * sky, white);
+        shaded.sunlit = shaded.sunlit.lerp(WHITE / PI * sun, white);
+        shaded.mirror_share *= 1.0 - white;
     }
 
     /// How much of what lies at a place beyond the raster is sea, in [0, 1]: as much as of the border next to it.
@@ -353,21 +375,22 @@ impl Stage<'_> {
     }
 
     /// The water at a place, as a pixel sees it.
-    fn pool(&self, lens: &Lens, direction: Vec3, position: DVec3, distance: f32) -> Pool {
+    fn pool(&self, lens: &Lens, direction: Vec3, position: DVec3, distance: f32, wet: Option<&Wet>) -> Pool {
         let at = position.truncate();
         let eye = -direction;
         let footprint = self.footprint(lens, distance, eye.z);
-        let ripples = ripples(at, footprint);
+        let ripples = wet.map_or_else(|| ripples(at, footprint), Wet::ripples);
+        let raised = wet.map_or(0.0, |_| (position.z + self.drop_at(at) - self.level()) as f32);
         let shown = normal_of_slope(ripples.slope);
         // Into the water, to where the bent ray meets the bed.
         let within = if shown.dot(eye) > 0.02 { refract(direction, shown) } else { refract(direction, Vec3::Z) };
         let down = (-within.z).max(0.3);
         let aside = within.truncate() / down;
         let mut below = at;
-        let mut depth = self.depth(at);
+        let mut depth = (self.depth(at) + raised).max(0.0);
         for _ in 0..3 {
             below = at + aside.as_dvec2() * f64::from(depth.min(60.0));
-            depth = 0.5 * (depth + self.depth(below));
+            depth = 0.5 * (depth + (self.depth(below) + raised).max(0.0));
         }
         let sun_within = -refract(-self.sun, Vec3::Z);
         let bed = if depth < 45.0 {
@@ -387,6 +410,11 @@ impl Stage<'_> {
             skylit: up(irradiance(&self.skylight.open, Vec3::Z) * 0.93),
             sunlit: up(self.air.sunlight(0.0) * (sun * (1.0 - fresnel(sun)))),
         }
+    }
+
+    /// Height of still water (m).
+    fn level(&self) -> f64 {
+        self.scene.water.map_or(0.0, |w| w.level)
     }
 
     /// Depth of the water at a world position (m). Beyond the raster the bed sinks on.

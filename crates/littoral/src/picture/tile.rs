@@ -9,9 +9,10 @@ use super::Settings;
 use super::sampler::Patterns;
 use super::shade::{Ahead, Near, Shaded};
 use super::stage::{Lens, Stage};
+use super::waves::Wet;
 use crate::raycast::LocalRay;
 use crate::space::View;
-use glam::{DVec3, UVec2, Vec3};
+use glam::{DVec3, UVec2, Vec2, Vec3};
 use std::ops::Range;
 
 /// Side of a tile (pixels).
@@ -122,6 +123,7 @@ impl Stage<'_> {
         }
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
+        let wet = self.wet_all(lens, &rays, &distances);
         let mut shaded: Vec<Shaded> = Vec::with_capacity(rays.len());
         let (mut shadow_rays, mut shadow_of) = (Vec::new(), Vec::new());
         let (mut mirror_rays, mut mirror_of) = (Vec::new(), Vec::new());
@@ -130,7 +132,7 @@ impl Stage<'_> {
             let mut near = Near::default();
             for s in samples.clone() {
                 let k = n * per_pixel + (s - samples.start) as usize;
-                let ahead = self.ahead(lens.eye, rays[k].direction, distances[k]);
+                let ahead = self.ahead(lens, rays[k].direction, distances[k], wet.get(k).copied().flatten());
                 let sample = self.shade(lens, rays[k].direction, &ahead, pattern, s, &mut near);
                 if let Some(ray) = sample.shadow {
                     shadow_rays.push(ray);
@@ -168,6 +170,18 @@ impl Stage<'_> {
         }
     }
 
+    /// Where rays meet the sea; empty where there is none.
+    fn wet_all(&self, lens: &Lens, rays: &[LocalRay], distances: &[f32]) -> Vec<Option<Wet>> {
+        match (lens.sea, self.scene.water) {
+            (Some(sea), Some(water)) => {
+                let mut wet = self.wet(lens, sea, rays, distances);
+                wet.iter_mut().for_each(|w| *w = w.filter(|w| water.covers(w.position.truncate())));
+                wet
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// What is seen through the middle of each pixel: the passes, which no filter may touch.
     fn middles(&self, mosaic: &Mosaic, places: impl Iterator<Item = UVec2>) -> Vec<Option<(DVec3, Vec3)>> {
         let Mosaic { lens, view, .. } = mosaic;
@@ -179,18 +193,23 @@ impl Stage<'_> {
         let rays: Vec<LocalRay> = places.map(ray).collect();
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
-        let seen =
-            rays.iter().zip(&distances).map(|(ray, &distance)| match self.ahead(lens.eye, ray.direction, distance) {
+        let wet = self.wet_all(lens, &rays, &distances);
+        let seen = rays.iter().zip(&distances).enumerate().map(|(k, (ray, &distance))| {
+            match self.ahead(lens, ray.direction, distance, wet.get(k).copied().flatten()) {
                 // Mist and floor stand for what is not known: nothing was measured there.
                 Ahead::Sky | Ahead::Mist { .. } | Ahead::Floor { .. } => None,
-                Ahead::Water { position } => Some((position, Vec3::Z)),
+                Ahead::Water { position, wet } => {
+                    let slope = wet.map_or(Vec2::ZERO, |w| w.slope);
+                    Some((position, Vec3::new(-slope.x, -slope.y, 1.0).normalize()))
+                }
                 Ahead::Wall(wall) => Some((wall.position, wall.normal)),
                 // The ground drawn reaches a little beyond the land, to dissolve into mist there.
                 Ahead::Ground { position } => {
                     let normal = self.scene.land.normal_at(position.truncate());
                     normal.map(|normal| (position, normal))
                 }
-            });
+            }
+        });
         seen.collect()
     }
 }
@@ -286,7 +305,7 @@ mod tests {
             let settings = Settings { samples: 6, seed };
             let by = |cast| {
                 let caster = OneByOne { land: &stage.ground.land, eye, cast };
-                stage.render_with(&caster, &view, &settings, &|_| {})
+                stage.render_with(&caster, None, &view, &settings, &|_| {})
             };
             let (pyramid, patches) = (by(Land::first_hit), by(Land::first_hit_patch_by_patch));
             assert!(bits(&pyramid) == bits(&patches), "seed {seed}: the pyramid changes the picture");

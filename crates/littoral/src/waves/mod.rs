@@ -8,12 +8,16 @@
 //! time is in seconds. Everything random comes from a seed by counting ([`random`]) and every elementary function from one library in Rust, so
 //! that a sea has the same bits on every platform.
 
+pub mod cascades;
 pub mod components;
 mod dispersion;
+mod fft;
 mod measured;
 mod model;
 mod peachey;
 pub mod random;
+mod sheltered;
+pub mod shore;
 mod sines;
 pub mod spec;
 mod spectrum;
@@ -27,6 +31,8 @@ pub use dispersion::{STANDARD_GRAVITY, SURFACE_TENSION, StillWater};
 pub use measured::{Band, Entropy, Measured};
 pub use model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
 pub use peachey::{Beach, Depths, Path, Peachey, Surf, Swell};
+pub use sheltered::{Shelter, Sheltered};
+pub use shore::{Bed, ShoreError, ShoreSea};
 pub use sines::{Length, Sine, Sines};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};

@@ -99,8 +99,10 @@ pub struct Bounds {
     pub slope: f32,
     /// Largest magnitude of the stretch (spectral norm) of (dx, dy).
     pub stretch: f32,
-    /// Largest second derivative of dz in any direction (1/m).
+    /// Largest second derivative of dz along any direction (1/m).
     pub curvature: f32,
+    /// Largest second derivative of (dx, dy) along any direction (1/m).
+    pub bend: f32,
 }
 
 /// A moving surface of waves over still water.

@@ -142,15 +142,15 @@ impl Sum {
                 hidden.push(sum);
             }
         }
-        let mut bounds = [0.0; 5];
+        let mut bounds = [0.0; 6];
         for Pushing { wave, push } in &waves {
             let (a, k) = (wave.amplitude, wave.wavenumber.length());
-            for (sum, part) in bounds.iter_mut().zip([a, push * a, k * a, push * k * a, k * k * a]) {
+            for (sum, part) in bounds.iter_mut().zip([a, push * a, k * a, push * k * a, k * k * a, push * k * k * a]) {
                 *sum += part;
             }
         }
         // A little above the sums, for what `f32` rounds.
-        let [height, sideways, slope, stretch, curvature] = bounds.map(|sum| (sum * (1.0 + 1e-5)) as f32);
+        let [height, sideways, slope, stretch, curvature, bend] = bounds.map(|sum| (sum * (1.0 + 1e-5)) as f32);
         let hot: Vec<Hot> = waves.iter().map(|wave| Hot::new(wave, water)).collect();
         let mut sum = Sum {
             water,
@@ -165,7 +165,7 @@ impl Sum {
             waves,
             slopes,
             hidden,
-            bounds: Bounds { height, sideways, slope, stretch, curvature },
+            bounds: Bounds { height, sideways, slope, stretch, curvature, bend },
         };
         sum.set_time(0.0);
         Ok(sum)

@@ -8,7 +8,7 @@
 //! Many files hold no data where there is sea. A void that the flood reaches and whose rim nearly everywhere lies about at the
 //! level is taken for it; all other voids stay unknown.
 
-use crate::field::Land;
+use super::Land;
 use glam::DVec2;
 
 /// A still body of water over land.
@@ -106,7 +106,7 @@ impl Water {
     }
 
     /// Whether a sample of the land, counted row by row from the south, lies under water.
-    pub(super) fn floods(&self, sample: usize) -> bool {
+    pub fn floods(&self, sample: usize) -> bool {
         self.reach[sample] == FLOODED
     }
 
