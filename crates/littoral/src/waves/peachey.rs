@@ -11,6 +11,8 @@
 //! Between the nodes of the bed everything is a quadratic B-spline, which smooths a little and never leaves the range of its nodes: so bounds
 //! hold. Beyond the bed its border's depths go on straight outward.
 
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays are told apart by their number")]
+
 use super::sum::circle;
 use super::{BLOCK, Bounds, Motion, OutOfRange, Points, STANDARD_GRAVITY, StillWater, Velocity, WaveModel};
 use glam::DVec2;

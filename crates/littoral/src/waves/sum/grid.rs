@@ -4,7 +4,8 @@
 //! and stretches, those of θ the same in a whole row of a stretch. What is left is a product of matrices, and as the two signs share it, one
 //! multiplication a wave and point.
 
-use super::{BLOCK, Lanes, Sum, circle};
+use super::kernel::{FARTHEST, Lanes, circle};
+use super::{BLOCK, Sum};
 use glam::DVec2;
 use multiversion::multiversion;
 
@@ -47,7 +48,7 @@ impl Sum {
         if heights.is_empty() {
             return;
         }
-        let fine = |number: f64| if number.abs() <= super::FARTHEST { number } else { 0.0 };
+        let fine = |number: f64| if number.abs() <= FARTHEST { number } else { 0.0 };
         let [origin, step] = [grid.origin, grid.step].map(|v| DVec2::new(fine(v.x), fine(v.y)));
         let grid = Grid { origin, step, ..*grid };
         let stretches = grid.columns.div_ceil(2 * HALF);
