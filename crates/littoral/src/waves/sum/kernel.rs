@@ -24,7 +24,7 @@ const CHUNK: usize = 512;
 
 /// cos 2πr = `COSINE` · v · p(v²), v = |r| − ¼, p = (((v² + c₂) v² + c₁) v² + c₀).
 pub(super) const COSINE: f64 = 70.993_429_954_819;
-const C0: f32 = -0.088_503_458;
+const C0: f32 = -0.088_503_46;
 const C1: f32 = 0.582_267_15;
 const C2: f32 = -1.145_750_7;
 
@@ -581,7 +581,7 @@ fn power_of_two(x: f32) -> f32 {
     let shifted = x + SHIFT;
     let f = x - (shifted - SHIFT);
     let p = 1.540_353e-4_f32.mul_add(f, 0.001_333_355_8).mul_add(f, 0.009_618_129).mul_add(f, 0.055_504_11);
-    let p = p.mul_add(f, 0.240_226_51).mul_add(f, std::f32::consts::LN_2).mul_add(f, 1.0);
+    let p = p.mul_add(f, 0.240_226_5).mul_add(f, std::f32::consts::LN_2).mul_add(f, 1.0);
     p * f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23))
 }
 
