@@ -3,7 +3,6 @@
 //! A new model adds one test that calls [`conforms`].
 
 use glam::DVec2;
-use littoral::waves::cascades::{Cascades, Options};
 use littoral::waves::{
     BLOCK, Beach, Bounds, Length, Motion, Path, Peachey, PlaneWave, Points, STANDARD_GRAVITY, SeaState, Sine, Sines,
     StillWater, Superposition, Surf, Swell, Velocity, WaveModel,
@@ -551,13 +550,6 @@ fn superpositions_conform() {
         conforms(&mut sea, USUAL);
     }
     conforms(&mut Superposition::of_state(&state(30.0), 11, 13).expect("a sea").looping(120.0).expect("a loop"), USUAL);
-}
-
-#[test]
-fn tiles_conform() {
-    let options = Options { samples: 64, foam: false, ..Options::default() };
-    let mut sea = Cascades::new(&state(f64::INFINITY), &options).expect("a sea");
-    conforms(&mut sea, Expected { error: 0.3, creases: 0.05, divergence: 0.1, ..USUAL });
 }
 
 #[test]

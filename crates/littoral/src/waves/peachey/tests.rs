@@ -130,6 +130,32 @@ fn profiles_are_as_written() {
 }
 
 #[test]
+fn slopes_follow_amplitude_profile_and_fading() {
+    // So steep that all of these change within a wave.
+    let bed = plane_beach(0.3, 2.0, 61, 61);
+    let surf = Surf { shoaling: true, breaking: 0.78 };
+    let waves = Peachey::new(&bed, &[Swell { period: 6.0, ..SWELL }], Path::Refracted, surf).expect("waves");
+    let height = |x: f64, y: f64, footprint: f32| {
+        let mut motion = Motion::STILL;
+        waves.add_motion(&Points { footprint: [footprint; BLOCK], ..Points::at(x, y) }, &mut motion);
+        motion
+    };
+    for footprint in [0.0, 8.0, 12.0] {
+        let mut wrong = 0;
+        for i in 0..300 {
+            let (x, y) = (20.0 + f64::from(i % 40) * 2.03, -3.0 - f64::from(i) * 0.3);
+            let here = height(x, y, footprint);
+            let by = |a: Motion, b: Motion| (a.dz[0] - b.dz[0]) / 0.1;
+            let x_slope = by(height(x + 0.05, y, footprint), height(x - 0.05, y, footprint));
+            let y_slope = by(height(x, y + 0.05, footprint), height(x, y - 0.05, footprint));
+            // Creases, of crests and where fading begins and ends, may lie between.
+            wrong += usize::from((x_slope - here.slope_x[0]).abs() > 4e-4 || (y_slope - here.slope_y[0]).abs() > 4e-4);
+        }
+        assert!(wrong <= 12, "{wrong} of 300 slopes at a footprint of {footprint} m");
+    }
+}
+
+#[test]
 fn energy_flux_is_kept() {
     let bed = plane_beach(0.02, 5.0, 61, 241);
     let surf = Surf { shoaling: true, breaking: 10.0 };
