@@ -14,9 +14,11 @@ mod dispersion;
 mod fft;
 mod measured;
 mod model;
+mod peachey;
 pub mod random;
 mod sheltered;
 pub mod shore;
+mod sines;
 pub mod spec;
 mod spectrum;
 mod spreading;
@@ -28,11 +30,14 @@ pub use components::PlaneWave;
 pub use dispersion::{STANDARD_GRAVITY, SURFACE_TENSION, StillWater};
 pub use measured::{Band, Entropy, Measured};
 pub use model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
+pub use peachey::{Beach, Depths, Path, Peachey, Surf, Swell};
 pub use sheltered::{Shelter, Sheltered};
 pub use shore::{Bed, ShoreError, ShoreSea};
+pub use sines::{Length, Sine, Sines};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};
 pub use state::{SeaState, Slice, Train, Wind, bearing_from_heading, heading_from_bearing};
+pub use sum::{Grid, GridScratch};
 pub use superposition::Superposition;
 
 /// A number that makes no sense where it was given.

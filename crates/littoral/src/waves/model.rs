@@ -125,6 +125,17 @@ pub trait WaveModel: Send + Sync {
     /// Adds the velocity of the water that rests `depths` (m, at least 0) below still water at `points`.
     fn add_velocity(&self, points: &Points, depths: &[f32; BLOCK], velocity: &mut Velocity);
 
+    /// [`WaveModel::add_displacement`] of many blocks, to the bit: faster where neighbouring blocks are near each other. As many blocks are
+    /// answered as the shorter slice has.
+    fn add_displacements(&self, points: &[Points], motions: &mut [Motion]) {
+        points.iter().zip(motions).for_each(|(points, motion)| self.add_displacement(points, motion));
+    }
+
+    /// [`WaveModel::add_motion`] of many blocks, likewise.
+    fn add_motions(&self, points: &[Points], motions: &mut [Motion]) {
+        points.iter().zip(motions).for_each(|(points, motion)| self.add_motion(points, motion));
+    }
+
     /// How far it goes at this instant, with everything (footprint 0).
     fn bounds(&self) -> Bounds;
 

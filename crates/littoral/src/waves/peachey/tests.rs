@@ -1,0 +1,202 @@
+use super::*;
+
+/// A beach along x, deep in the south: depth = slope × distance from y = 0, with 20 m at most.
+fn plane_beach(slope: f64, spacing: f64, columns: usize, rows: usize) -> Depths {
+    let far = (rows - 1) as f64 * spacing;
+    let depth = |row: usize| (slope * (far - row as f64 * spacing)).min(20.0) as f32;
+    let depths = (0..columns * rows).map(|node| depth(node / columns)).collect();
+    Depths { origin: DVec2::new(0.0, -far), spacing, columns, rows, depths }
+}
+
+const SWELL: Swell = Swell { amplitude: 0.5, period: 8.0, heading: 1.0, phase: 0.2 };
+
+#[test]
+fn approximations_keep_what_peachey_states() {
+    let mut worst = (0.0, 0.0);
+    for i in 1..4000 {
+        let wanted = f64::from(i) * 2e-3;
+        let exact = wavenumber(wanted, 1.0);
+        let same = StillWater::of_depth(1.0).expect("wet").wavenumber(sqrt(wanted * STANDARD_GRAVITY));
+        assert!((exact / same - 1.0).abs() < 1e-11, "k∞h {wanted}");
+        let error = 1.0 - rough_wavenumber(wanted, 1.0) / exact;
+        assert!(error > -1e-9);
+        if error > worst.0 {
+            worst = (error, wanted);
+        }
+        // Shallower than a twentieth of the wavelength, √(k∞ / h).
+        if exact / TAU < 0.05 {
+            assert!((sqrt(wanted) / exact - 1.0).abs() < 0.02, "k∞h {wanted}: {exact}");
+        }
+        if exact / TAU > 0.25 {
+            assert!(error < 0.032, "k∞h {wanted}: {error}");
+        }
+    }
+    assert!((worst.0 - 0.0498).abs() < 2e-4 && (worst.1 - 0.694).abs() < 0.01, "{worst:?}");
+}
+
+#[test]
+fn crests_turn_as_snell_says() {
+    let bed = plane_beach(0.02, 5.0, 121, 241);
+    for heading in [0.6, 1.0, 1.5, PI / 2.0, 2.1, 2.5] {
+        let waves = Peachey::new(&bed, &[Swell { heading, ..SWELL }], Path::Refracted, Surf::default()).expect("waves");
+        let train = &waves.trains[0];
+        let kept = train.far.x;
+        let deep = TAU * TAU / 64.0 / STANDARD_GRAVITY;
+        for i in 0..200 {
+            let (x, y) = (20.0 + f64::from(i % 20) * 29.0, -40.0 - f64::from(i) * 5.5);
+            let here = waves.at(train, x, y);
+            let k = wavenumber(deep, 0.02 * -y.min(0.0).max(-1000.0)) / TAU;
+            // sin α over the phase speed is constant, and the wave as long as the depth wants it.
+            assert!(
+                (here.cycles[1] - kept).abs() < 0.01 * kept.abs() + 1e-6,
+                "{heading}: {x}, {y}: {} {kept}",
+                here.cycles[1]
+            );
+            let length = sqrt(here.cycles[1].powi(2) + here.cycles[2].powi(2));
+            assert!((length / k - 1.0).abs() < 0.01, "{heading}: {x}, {y}: {length} {k}");
+        }
+    }
+}
+
+#[test]
+fn straight_rays_add_up_the_wave_number() {
+    let bed = plane_beach(0.02, 5.0, 121, 241);
+    let deep = TAU * TAU / 64.0 / STANDARD_GRAVITY;
+    let incoming = rough_wavenumber(deep, 20.0) / TAU;
+    for heading in [0.5, 1.0, PI / 2.0] {
+        let waves = Peachey::new(&bed, &[Swell { heading, ..SWELL }], Path::Straight, Surf::default()).expect("waves");
+        let train = &waves.trains[0];
+        let (sin, cos) = (heading.sin(), heading.cos());
+        for i in 0..20 {
+            let (x, y) = (100.0 + f64::from(i) * 20.0, -60.0 - f64::from(i) * 40.0);
+            // Back along the ray to the first row.
+            let reach = (y + 1200.0) / sin;
+            let steps = 20_000;
+            let sum: f64 = (0..steps)
+                .map(|n| y - sin * reach * (f64::from(n) + 0.5) / f64::from(steps))
+                .map(|y| rough_wavenumber(deep, (0.02 * -y).min(20.0)) / TAU)
+                .sum();
+            let start = DVec2::new(x - cos * reach, 0.0);
+            let expected = incoming * start.x * cos + sum * reach / f64::from(steps);
+            let got = waves.at(train, x, y).cycles[0] - train.cycles;
+            // Asking a row before smears a little where depths bend much: near the shore.
+            assert!((got - expected).abs() < 0.03, "{heading}: {x}, {y}: {got} for {expected}");
+        }
+    }
+}
+
+#[test]
+fn waves_keep_their_period_and_break_at_the_surf() {
+    let shore = vec![DVec2::new(600.0, 0.0), DVec2::new(300.0, 0.0), DVec2::new(0.0, 100.0)];
+    let beach = Beach { shore, slope: 0.03, surf_width: 50.0 };
+    let bed = beach.depths(DVec2::new(0.0, -500.0), 5.0, 121, 131).expect("a bed");
+    let surf = Surf { shoaling: false, breaking: beach.breaking(0.5).expect("a ratio") };
+    let swell = Swell { heading: 1.6, ..SWELL };
+    let mut waves = Peachey::new(&bed, &[swell], Path::Refracted, surf).expect("waves");
+    // 40 m and 150 m off the shore at x = 400, the height is four fifths and the whole; on land there is none.
+    for (y, most) in [(-150.0, 0.5), (-40.0, 0.4), (-20.0, 0.2), (20.0, 0.0)] {
+        let mut highest = 0f32;
+        for step in 0..400 {
+            waves.set_time(f64::from(step) * 0.02);
+            let mut motion = Motion::STILL;
+            waves.add_displacement(&Points::at(400.0, y), &mut motion);
+            highest = highest.max(motion.dz[0]);
+            waves.set_time(f64::from(step) * 0.02 + 8.0);
+            let mut later = Motion::STILL;
+            waves.add_displacement(&Points::at(400.0, y), &mut later);
+            assert!((later.dz[0] - motion.dz[0]).abs() < 1e-5);
+        }
+        assert!((highest - most).abs() < 0.01, "{highest} at {y}");
+    }
+    // The sea is to the left of the shore, at its corner too.
+    assert!(beach.distance(DVec2::new(200.0, -50.0)) > 0.0 && beach.distance(DVec2::new(300.0, 30.0)) < 0.0);
+}
+
+#[test]
+fn profiles_are_as_written() {
+    for i in 0..100 {
+        let u = f64::from(i) / 100.0;
+        let (deep, by_deep, _) = profile(u + 7.0, 0.0);
+        assert!((f64::from(deep) - (TAU * u).cos()).abs() < 2e-6);
+        assert!((f64::from(by_deep) + TAU * (TAU * u).sin()).abs() < 2e-5);
+        let (shore, by_shore, _) = profile(u - 3.0, 1.0);
+        assert!((f64::from(shore) - (8.0 * (u - 0.5).powi(2) - 1.0)).abs() < 1e-5);
+        assert!((f64::from(by_shore) - 16.0 * (u - 0.5)).abs() < 1e-5);
+    }
+    for shore in [0.0, 0.3, 1.0] {
+        let mean = (0..1000).map(|i| profile((f64::from(i) + 0.5) / 1000.0, shore).1.powi(2)).sum::<f32>() / 1000.0;
+        assert!((mean / profile_steepness(shore) - 1.0).abs() < 1e-4, "{mean} at {shore}");
+    }
+}
+
+#[test]
+fn slopes_follow_amplitude_profile_and_fading() {
+    // So steep that all of these change within a wave.
+    let bed = plane_beach(0.3, 2.0, 61, 61);
+    let surf = Surf { shoaling: true, breaking: 0.78 };
+    let waves = Peachey::new(&bed, &[Swell { period: 6.0, ..SWELL }], Path::Refracted, surf).expect("waves");
+    let height = |x: f64, y: f64, footprint: f32| {
+        let mut motion = Motion::STILL;
+        waves.add_motion(&Points { footprint: [footprint; BLOCK], ..Points::at(x, y) }, &mut motion);
+        motion
+    };
+    for footprint in [0.0, 8.0, 12.0] {
+        let mut wrong = 0;
+        for i in 0..300 {
+            let (x, y) = (20.0 + f64::from(i % 40) * 2.03, -3.0 - f64::from(i) * 0.3);
+            let here = height(x, y, footprint);
+            let by = |a: Motion, b: Motion| (a.dz[0] - b.dz[0]) / 0.1;
+            let x_slope = by(height(x + 0.05, y, footprint), height(x - 0.05, y, footprint));
+            let y_slope = by(height(x, y + 0.05, footprint), height(x, y - 0.05, footprint));
+            // Creases, of crests and where fading begins and ends, may lie between.
+            wrong += usize::from((x_slope - here.slope_x[0]).abs() > 4e-4 || (y_slope - here.slope_y[0]).abs() > 4e-4);
+        }
+        assert!(wrong <= 12, "{wrong} of 300 slopes at a footprint of {footprint} m");
+    }
+}
+
+#[test]
+fn energy_flux_is_kept() {
+    let bed = plane_beach(0.02, 5.0, 61, 241);
+    let surf = Surf { shoaling: true, breaking: 10.0 };
+    let waves = Peachey::new(&bed, &[Swell { heading: PI / 2.0, ..SWELL }], Path::Refracted, surf).expect("waves");
+    let deep = TAU * TAU / 64.0 / STANDARD_GRAVITY;
+    let flux = |depth: f64| StillWater { depth, ..StillWater::DEEP }.group_speed(wavenumber(deep, depth));
+    for depth in [1.0, 2.0, 5.0, 15.0] {
+        let here = waves.at(&waves.trains[0], 150.0, -depth / 0.02);
+        assert!((here.amplitude[0] / (0.5 * sqrt(flux(20.0) / flux(depth))) - 1.0).abs() < 0.005, "{depth} m");
+    }
+}
+
+#[test]
+fn nonsense_is_refused() {
+    let bed = plane_beach(0.02, 5.0, 11, 61);
+    let new = |bed: &Depths, swell: Swell, surf| Peachey::new(bed, &[swell], Path::Refracted, surf);
+    assert!(new(&bed, SWELL, Surf::default()).is_ok());
+    for wrong in [
+        Swell { amplitude: f64::NAN, ..SWELL },
+        Swell { period: 0.0, ..SWELL },
+        Swell { heading: f64::INFINITY, ..SWELL },
+        Swell { phase: f64::NAN, ..SWELL },
+    ] {
+        assert!(new(&bed, wrong, Surf::default()).is_err(), "{wrong:?}");
+    }
+    assert!(new(&bed, SWELL, Surf { shoaling: true, breaking: f64::INFINITY }).is_err());
+    assert!(new(&Depths { spacing: 0.0, ..bed.clone() }, SWELL, Surf::default()).is_err());
+    assert!(new(&Depths { rows: 62, ..bed.clone() }, SWELL, Surf::default()).is_err());
+    assert!(new(&Depths { columns: usize::MAX, ..bed.clone() }, SWELL, Surf::default()).is_err());
+    // All land, and water only behind it.
+    assert!(new(&Depths { depths: vec![f32::NAN; 11 * 61], ..bed.clone() }, SWELL, Surf::default()).is_err());
+    let lee = Swell { heading: -PI / 2.0, ..SWELL };
+    let error = new(&bed, lee, Surf::default()).map(|_| ()).expect_err("waves from the land").to_string();
+    assert!(error.contains("water along the side"), "{error}");
+    // Hostile depths are waded through.
+    let mut odd = bed;
+    for (node, depth) in odd.depths.iter_mut().enumerate().skip(11) {
+        *depth = [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e-30, 1e30, 3.0][node % 6];
+    }
+    let waves = new(&odd, SWELL, Surf::default()).expect("waves");
+    let mut motion = Motion::STILL;
+    waves.add_motion(&Points { x: std::array::from_fn(|i| i as f64 * 3.0), ..Points::at(0.0, -250.0) }, &mut motion);
+    assert!(motion.dz.iter().chain(&motion.slope_x).all(|number| number.is_finite()));
+}
