@@ -49,7 +49,8 @@ fn a_plane_beach_refracts_by_snell_and_shoals_by_green() {
             }
             let (amplitude, direction) = sea.component(0, MIDDLE + 3.0, y);
             let k = water(h).wavenumber(omega);
-            worst_turn = worst_turn.max((direction.x / direction.length() - across / k).abs() / (across / k).abs().max(0.1));
+            worst_turn =
+                worst_turn.max((direction.x / direction.length() - across / k).abs() / (across / k).abs().max(0.1));
             worst_length = worst_length.max((direction.length() / k - 1.0).abs());
             worst_rise = worst_rise.max((amplitude / (0.01 * (flux(depth) / flux(h)).sqrt()) - 1.0).abs());
         }
@@ -110,7 +111,9 @@ fn the_flux_of_energy_is_kept_over_an_uneven_bed() {
     };
     let first = flux(22.0);
     let worst = (1..38).map(|i| (flux(22.0 + 20.0 * f64::from(i)) / first - 1.0).abs()).fold(0.0, f64::max);
-    let (highest, _) = (0..40).map(|i| sea.component(0, 1200.0, 350.0 + 8.0 * f64::from(i))).fold((0.0f64, ()), |m, c| (m.0.max(c.0), ()));
+    let (highest, _) = (0..40)
+        .map(|i| sea.component(0, 1200.0, 350.0 + 8.0 * f64::from(i)))
+        .fold((0.0f64, ()), |m, c| (m.0.max(c.0), ()));
     println!("flux changes by {worst:.4}; behind the shoal waves grow by {:.2}", highest / 0.05);
     assert!(worst < 0.02, "{worst}");
     assert!(highest > 0.05 * 1.3, "the shoal focuses");
@@ -173,12 +176,20 @@ fn waves_bend_round_a_breakwater_as_sommerfeld_says() {
             }
             count += 1.0;
             if i % 4 == 0 && j % 4 == 0 {
-                println!("  y {j} λ, x {:5.2} y: {ours:.3}, exact {:.3} {:.3} {:.3}", f64::from(i) / 12.0, exact[0], exact[1], exact[2]);
+                println!(
+                    "  y {j} λ, x {:5.2} y: {ours:.3}, exact {:.3} {:.3} {:.3}",
+                    f64::from(i) / 12.0,
+                    exact[0],
+                    exact[1],
+                    exact[2]
+                );
             }
         }
     }
     let rms = square.map(|s| (s / count).sqrt());
-    println!("against Sommerfeld (soft, hard, their mean): largest {worst:.3?}, rms {rms:.3?} of the incoming amplitude");
+    println!(
+        "against Sommerfeld (soft, hard, their mean): largest {worst:.3?}, rms {rms:.3?} of the incoming amplitude"
+    );
     // The march has no waves on the screen, as a soft one.
     assert!(worst[0] < 0.10 && rms[0] < 0.04);
 }
@@ -200,7 +211,14 @@ fn complex(sea: &mut ShoreSea, period: f64, places: &[DVec2]) -> Vec<(f64, f64)>
 
 /// The mild-slope equation of one frequency in time (R. Smith, T. Sprinks 1975): φ'' = ∇·(c c_g ∇φ) − (ω² − k² c c_g) φ, on a fine grid, with the
 /// incoming wave held on along the border and the island's shore swallowing what comes.
-fn fine_solution(incoming: &PlaneWave, amplitude: f64, half: f64, step: f64, depth: impl Fn(DVec2) -> f64, places: &[DVec2]) -> Vec<(f64, f64)> {
+fn fine_solution(
+    incoming: &PlaneWave,
+    amplitude: f64,
+    half: f64,
+    step: f64,
+    depth: impl Fn(DVec2) -> f64,
+    places: &[DVec2],
+) -> Vec<(f64, f64)> {
     let n = (2.0 * half / step) as usize + 1;
     let omega = incoming.angular_frequency;
     let place = |i: usize| DVec2::new((i % n) as f64, (i / n) as f64) * step - DVec2::splat(half);
@@ -214,9 +232,8 @@ fn fine_solution(incoming: &PlaneWave, amplitude: f64, half: f64, step: f64, dep
         .collect();
     let ramp = |d: f64| ((d - (half - 130.0)) / 130.0).clamp(0.0, 1.0).powi(3) * 0.15;
     let hold: Vec<f32> = (0..n * n).map(|i| ramp(place(i).x.abs()).max(ramp(place(i).y.abs())) as f32).collect();
-    let swallow: Vec<f32> = (0..n * n)
-        .map(|i| (((3.5 - depth(place(i))) / 3.5).clamp(0.0, 1.2).powi(2) * 0.08) as f32)
-        .collect();
+    let swallow: Vec<f32> =
+        (0..n * n).map(|i| (((3.5 - depth(place(i))) / 3.5).clamp(0.0, 1.2).powi(2) * 0.08) as f32).collect();
     let dt = 2.0 * std::f64::consts::PI / omega / 90.0;
     let steps = 90 * 26;
     let (mut now, mut before) = (vec![0.0f32; n * n], vec![0.0f32; n * n]);
@@ -302,7 +319,10 @@ fn round_an_island_waves_agree_with_a_fine_solution_in_time() {
     }
     let rms = f64::sqrt(square / count);
     let height = f64::sqrt(heights / count) / 0.01;
-    println!("round an island: phases rms {rms:.4}, worst {worst:.4} of the phase run, {:.3} within 2 %; amplitudes rms {height:.3} ({count} places)", within / count);
+    println!(
+        "round an island: phases rms {rms:.4}, worst {worst:.4} of the phase run, {:.3} within 2 %; amplitudes rms {height:.3} ({count} places)",
+        within / count
+    );
     // Deep in the lee, where waves have turned by more than the march can follow, the rest is lost.
     assert!(rms < 0.015 && within > 0.9 * count, "{rms}");
 }
@@ -468,17 +488,22 @@ fn hostile_beds_and_numbers_do_no_harm() {
                     sea.add_motion(&points, &mut m);
                     sea.add_velocity(&points, &[0.5; 16], &mut v);
                     sea.waterline(&points, &mut w);
-                    let all = [m.dx, m.dy, m.dz, m.slope_x, m.slope_y, m.dxx, m.dxy, m.dyy, m.hidden_xx, m.foam, v.x, v.z, w];
+                    let all =
+                        [m.dx, m.dy, m.dz, m.slope_x, m.slope_y, m.dxx, m.dxy, m.dyy, m.hidden_xx, m.foam, v.x, v.z, w];
                     assert!(all.iter().flatten().all(|n| n.is_finite()), "{x}, {y} at {time}: {m:?}");
                 }
             }
             let b = sea.bounds();
-            assert!([b.height, b.sideways, b.slope, b.stretch, b.curvature, b.bend].iter().all(|n| n.is_finite()), "{b:?}");
+            assert!(
+                [b.height, b.sideways, b.slope, b.stretch, b.curvature, b.bend].iter().all(|n| n.is_finite()),
+                "{b:?}"
+            );
         }
     }
     let bed = grid(vec![5.0; 600]).expect("a bed");
     let fine = wave(8.0, 0.1, 1.0, 5.0);
-    let refused = |w: PlaneWave, depth: f64| ShoreSea::of_waves(&bed, &[w], depth, &Settings::default(), &|_| true).is_err();
+    let refused =
+        |w: PlaneWave, depth: f64| ShoreSea::of_waves(&bed, &[w], depth, &Settings::default(), &|_| true).is_err();
     assert!(refused(fine, 0.0) && refused(fine, f64::NAN));
     assert!(refused(PlaneWave { amplitude: f64::NAN, ..fine }, 5.0));
     assert!(refused(PlaneWave { wavenumber: DVec2::ZERO, ..fine }, 5.0));
@@ -538,7 +563,10 @@ fn water_moves_as_linear_waves_have_it() {
             let speed = 0.02 * incoming.angular_frequency;
             let exact = incoming.wavenumber / k * (speed * sideways * phase.cos());
             let rise = speed * upright * phase.sin();
-            assert!((f64::from(v.x[3]) - exact.x).abs() < 2e-4 && (f64::from(v.y[3]) - exact.y).abs() < 2e-4, "{exact} {v:?}");
+            assert!(
+                (f64::from(v.x[3]) - exact.x).abs() < 2e-4 && (f64::from(v.y[3]) - exact.y).abs() < 2e-4,
+                "{exact} {v:?}"
+            );
             assert!((f64::from(v.z[3]) - rise).abs() < 2e-4);
         }
     }

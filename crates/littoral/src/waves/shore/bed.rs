@@ -94,8 +94,18 @@ impl Bed {
         OutOfRange::unless(finite && length > 0.0, "length of the shoreline", expected, length)?;
         let (width, at_break) = match surf {
             Some(Surf { width, height }) => {
-                OutOfRange::unless(width > 0.0 && width < 1e5, "width of the surf", "m, above 0 and below 100000", width)?;
-                OutOfRange::unless(height > 0.0 && height < 50.0, "height of the surf", "m, above 0 and below 50", height)?;
+                OutOfRange::unless(
+                    width > 0.0 && width < 1e5,
+                    "width of the surf",
+                    "m, above 0 and below 100000",
+                    width,
+                )?;
+                OutOfRange::unless(
+                    height > 0.0 && height < 50.0,
+                    "height of the surf",
+                    "m, above 0 and below 50",
+                    height,
+                )?;
                 (width, height / f64::from(super::BREAKING))
             }
             None => (0.0, 0.0),

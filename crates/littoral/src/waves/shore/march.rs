@@ -117,9 +117,7 @@ impl March {
     /// Starts with the waves of the open sea on a row of `nodes`.
     pub(super) fn start(&mut self, nodes: usize) {
         let March { b, whole, p, v, g, inverse, part, root, records, told } = self;
-        for (list, value) in
-            [(b, Complex::ONE), (v, Complex::ZERO), (g, Complex::ZERO), (inverse, Complex::ZERO)]
-        {
+        for (list, value) in [(b, Complex::ONE), (v, Complex::ZERO), (g, Complex::ZERO), (inverse, Complex::ZERO)] {
             list.clear();
             list.resize(nodes, value);
         }

@@ -118,7 +118,11 @@ fn corners(sea: &ShoreSea, column: usize, row: usize) -> [Option<usize>; 4] {
 
 /// Sums over the waves of what they can be in a cell at most: height, slope, curvature; handing each wave's to `each`.
 #[inline(always)]
-fn sums(sea: &ShoreSea, corners: [Option<usize>; 4], mut each: impl FnMut(usize, &[f32; LANES], &[f32; LANES])) -> [f32; 3] {
+fn sums(
+    sea: &ShoreSea,
+    corners: [Option<usize>; 4],
+    mut each: impl FnMut(usize, &[f32; LANES], &[f32; LANES]),
+) -> [f32; 3] {
     let (over_x, over_y) = ((1.0 / sea.spacing.x) as f32, (1.0 / sea.spacing.y) as f32);
     let open = Record::OPEN;
     let mut all = [0.0f32; 3];

@@ -131,10 +131,7 @@ impl Grid {
         a.clear();
         a.extend((0..count).map(|i| {
             let (column, row) = (i % columns, i / columns);
-            let inside = column >= apron[0]
-                && column < columns - apron[0]
-                && row >= apron[1]
-                && row < rows - apron[1];
+            let inside = column >= apron[0] && column < columns - apron[0] && row >= apron[1] && row < rows - apron[1];
             f32::from(u8::from(inside && bed.depths()[bed_index(i)] <= 0.0))
         }));
         self.near.clear();
@@ -253,7 +250,7 @@ pub(super) fn solve(
     let wavelength = if mean > 0.0 { TAU / mean } else { 50.0 };
     grid.lay(bed, depth, wavelength, settings, smooth, other);
     gather(batches, waves, depth, grid);
-    let rows: usize = batches.iter().map(|b| if b.axis % 2 == 0 { grid.columns } else { grid.rows }).sum();
+    let rows: usize = batches.iter().map(|b| if b.axis.is_multiple_of(2) { grid.columns } else { grid.rows }).sum();
     let progress = Progress { done: AtomicUsize::new(0), all: 2 * rows, stopped: AtomicBool::new(false), tell };
     let whole: f64 = waves.iter().map(|w| w.amplitude * w.amplitude).sum();
     let alone = batches.len() < 2;
@@ -334,7 +331,13 @@ fn check(waves: &[PlaneWave], depth: f64, settings: &Settings) -> Result<(), Out
 fn gather(batches: &mut Vec<Batch>, waves: &[PlaneWave], depth: f64, grid: &Grid) {
     let axis = |w: &PlaneWave| {
         let (x, y) = (w.wavenumber.x, w.wavenumber.y);
-        if x.abs() >= y.abs() { if x > 0.0 { 0 } else { 2 } } else if y > 0.0 { 1 } else { 3 }
+        if x.abs() >= y.abs() {
+            if x > 0.0 { 0 } else { 2 }
+        } else if y > 0.0 {
+            1
+        } else {
+            3
+        }
     };
     let mut used = 0;
     for march in 0..4 {
@@ -370,7 +373,7 @@ impl Waves {
             // Waves whose own wave number is not that of still water keep the ratio.
             let ratio = k / water.wavenumber(omega);
             for (step, entry) in self.table.iter_mut().enumerate() {
-                let s = (step as f64 / STEPS as f64).max(1e-3).min(1.0);
+                let s = (step as f64 / STEPS as f64).clamp(1e-3, 1.0);
                 let h = if s >= 1.0 { f64::INFINITY } else { SCALE * s * s / (1.0 - s * s) };
                 let here = StillWater { depth: h, ..StillWater::DEEP };
                 let k = quick(omega, h);
@@ -378,7 +381,7 @@ impl Waves {
                 entry[1].0[l] = here.group_speed(k) as f32;
             }
             let forward = AXES[axis];
-            let across = if axis % 2 == 0 { wave.wavenumber.y } else { wave.wavenumber.x };
+            let across = if axis.is_multiple_of(2) { wave.wavenumber.y } else { wave.wavenumber.x };
             let step = grid.spacing.max_element();
             self.across.0[l] = across as f32;
             self.finest.0[l] = (k + 2.4 / step) as f32;
@@ -428,11 +431,13 @@ impl Batch {
         let count = columns * rows;
         records.resize(count, Record::NONE);
         told.resize(count, Told::default());
-        let along_x = *axis % 2 == 0;
+        let along_x = axis.is_multiple_of(2);
         let (steps, across) = if along_x { (columns, rows) } else { (rows, columns) };
-        let (forward, apart) = if along_x { (grid.spacing.x, grid.spacing.y) } else { (grid.spacing.y, grid.spacing.x) };
+        let (forward, apart) =
+            if along_x { (grid.spacing.x, grid.spacing.y) } else { (grid.spacing.y, grid.spacing.x) };
         let backward = *axis >= 2;
-        let (apron_along, apron_across) = if along_x { (grid.apron[0], grid.apron[1]) } else { (grid.apron[1], grid.apron[0]) };
+        let (apron_along, apron_across) =
+            if along_x { (grid.apron[0], grid.apron[1]) } else { (grid.apron[1], grid.apron[0]) };
         march.start(across);
         nodes.resize(across, Node::default());
         let at = |step: usize, j: usize| {
