@@ -388,6 +388,8 @@ impl ShoreSea {
                 for &n in &around {
                     place.0.iter_mut().zip(self.places[n].0).for_each(|(sum, value)| *sum += value / count as f32);
                 }
+                // Rollers do not climb the beach.
+                place.0[Place::BROKEN] *= 0.7;
                 self.places[i] = place;
                 rings[i] = ring;
                 false
