@@ -4,6 +4,7 @@ use crate::ground::System;
 use crate::render::Subject;
 use crate::talk::{Failure, Talk, progress, seconds as shown_seconds, tidy};
 use glam::{DVec2, UVec2};
+use littoral::field::Sea;
 use littoral::flight::{Flight, FlightPath, Level, Look, Pace, Spot};
 use littoral::picture::{Border, Display, Exposure, Settings, Stage, suiting_border};
 use littoral::space::View;
@@ -73,6 +74,7 @@ impl Order<'_> {
         &self,
         subject: &Subject,
         stage: &Stage<'_>,
+        mut sea: Option<&mut Sea>,
         settings: &Settings,
         started: Instant,
         talk: &mut Talk,
@@ -101,12 +103,17 @@ impl Order<'_> {
             View::looking_at(pose.position, pose.position + pose.direction * 1000.0, self.field as f32, size)
         };
         let display = Display { exposure: Exposure::Grey(steady_grey(&flight, stage, &view)), ..Display::default() };
+        let begin = sea.as_ref().map_or(0.0, |sea| sea.time());
         let bar = progress(frames as u64, "filming");
         let mut drawn = 0;
         for frame in 1..=frames {
             let there = matches!(&sink, Sink::Folder(folder) if folder.has(frame));
             if !there {
-                let picture = stage.render(&view((frame - 1) as f64 / self.fps, self.size), settings, &|_| {});
+                let time = (frame - 1) as f64 / self.fps;
+                if let Some(sea) = &mut sea {
+                    sea.set_time(begin + time);
+                }
+                let picture = stage.render_sea(sea.as_deref(), &view(time, self.size), settings, &|_| {});
                 let pixels = picture.display(&display);
                 match &mut sink {
                     Sink::Film(film) => film.frame(&pixels)?,

@@ -6,9 +6,10 @@ use crate::input::{self, Target, WaterLevel};
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
-use littoral::field::{Land, Water, coast};
+use littoral::field::{Land, Sea, Water, coast};
 use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
 use littoral::space::{Ray, View};
+use littoral::waves::{SeaState, spec::SpecError};
 use littoral_data::write::{self, Layer, PngPixels};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ use std::time::Instant;
   littoral render dem.tif --eye 562300,5109500,2 --look 562300,5115800 --above
   littoral render dem.tif --style image --texture ortho.tif
   littoral render dem.tif --out linear.exr --passes depth,normal
+  littoral render dem.tif --sea wind=14,from=300 --sun 300,8
+  littoral render --sea beaufort=8,from=240                the coast in a storm
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
   littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4
@@ -82,6 +85,14 @@ pub struct Render {
     /// and voids with a rim at that height
     #[arg(long, value_name = "METRES|none", value_parser = input::water, default_value = "0", help_heading = "Look")]
     water: WaterLevel,
+    /// The waves on the sea: wind=15,from=240 (m/s, and where it blows from), hs=2,tp=9 (height and period), beaufort=6, douglas=4 or calm;
+    /// more with fetch=KM, swell=HEIGHT@PERIOD/FROM, model=, gamma=, spread=, depth=, seed= [default: calm; the built-in coast:
+    /// beaufort=4,from=225]
+    #[arg(long, value_name = "SPEC", value_parser = sea_state, help_heading = "Look")]
+    sea: Option<SeaState>,
+    /// The instant of the sea in seconds; of a film, that of its first frame
+    #[arg(long, value_name = "S", value_parser = instant, default_value = "0", help_heading = "Look")]
+    time: f64,
     /// How far one sees: 10 in haze, 40 on a clear day, 200 in the clearest air [default: what suits the land]
     #[arg(long, value_name = "KILOMETRES", value_parser = input::positive, help_heading = "Look")]
     visibility: Option<f64>,
@@ -113,6 +124,14 @@ pub struct Render {
     /// Save the path as text, to be edited
     #[arg(long, value_name = "FILE.toml", requires = "path", help_heading = "Film")]
     save_path: Option<PathBuf>,
+}
+
+fn sea_state(text: &str) -> Result<SeaState, String> {
+    text.parse().map_err(|e: SpecError| e.to_string())
+}
+
+fn instant(text: &str) -> Result<f64, String> {
+    input::within(text, -1e9, 1e9, "-1e9 to 1e9 seconds")
 }
 
 fn fps(text: &str) -> Result<f64, String> {
@@ -211,13 +230,15 @@ impl Render {
             ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
         };
         let stage = Stage::new(&scene);
+        let mut sea = self.waves(&subject, talk)?;
         let settings = Settings { samples: self.samples, seed: self.seed };
         if let Some(film) = film {
-            return film.run(&subject, &stage, &settings, started, talk);
+            return film.run(&subject, &stage, sea.as_mut(), &settings, started, talk);
         }
 
         let bar = progress(1000, "rendering");
-        let picture = stage.render(&shot.view, &settings, &|done| bar.set_position((done * 1000.0) as u64));
+        let picture =
+            stage.render_sea(sea.as_ref(), &shot.view, &settings, &|done| bar.set_position((done * 1000.0) as u64));
         bar.finish_and_clear();
         let passes = self.save(&picture, &out, &subject)?;
 
@@ -256,6 +277,36 @@ impl Render {
         ))
     }
 
+    /// The waves on the subject's water at the first instant.
+    fn waves(&self, subject: &Subject, talk: &mut Talk) -> Result<Option<Sea>, Failure> {
+        let state = match &self.sea {
+            Some(state) => state.clone(),
+            None if self.files.is_empty() => coast::sea_state(),
+            None => return Ok(None),
+        };
+        let Some(water) = &subject.water else {
+            if self.sea.is_some() {
+                talk.warn(format!("{}: no water for --sea; --water METRES says how high it stands", subject.name));
+            }
+            return Ok(None);
+        };
+        // Bearings count from true north, headings from the land's x axis.
+        let state = state.turned(-subject.frame.north());
+        if state.trains.is_empty() {
+            return Ok(None);
+        }
+        let bar = progress(1000, "carrying the waves over the bed");
+        let told = |done: f64| {
+            bar.set_position((done * 1000.0) as u64);
+            true
+        };
+        let made = Sea::over(&subject.land, water, &state, &told);
+        bar.finish_and_clear();
+        let mut sea = made.map_err(|e| Failure::Work(format!("{}: {e}", subject.name)))?;
+        sea.set_time(self.time);
+        Ok(Some(sea))
+    }
+
     /// The film that is wanted, if one is.
     fn film<'a>(&'a self, out: &'a Output, shot: &Framed) -> Option<film::Order<'a>> {
         /// Vertical angle of view (rad) of a moderate wide-angle lens: a film moves, whatever lens a still picture has.
@@ -268,7 +319,10 @@ impl Render {
             save: self.save_path.as_deref(),
             out: &out.file,
             folder: out.kind == Kind::Frames,
-            look: format!("{:?} {:?} {:?} water {:?}", shot.sun, shot.air, shot.style, self.water),
+            look: format!(
+                "{:?} {:?} {:?} water {:?} sea {:?} time {}",
+                shot.sun, shot.air, shot.style, self.water, self.sea, self.time
+            ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,
         })

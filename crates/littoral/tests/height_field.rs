@@ -4,8 +4,9 @@
 
 use glam::DVec2;
 use littoral::field::noise::{Fbm, NoiseField};
-use littoral::field::{HeightField, Land, Raster, Window};
-use littoral::space::{Cell, Place};
+use littoral::field::{HeightField, Land, Raster, Sea, Window};
+use littoral::space::{Cell, Datum, Place};
+use littoral::waves::{SeaState, Superposition};
 use proptest::prelude::*;
 
 /// A small deterministic generator: tests name their seed, failures repeat.
@@ -107,6 +108,21 @@ fn random_land(columns: usize, rows: usize, random: &mut Random) -> Land {
     let heights: Vec<f32> = heights.collect();
     let spacing = DVec2::new(0.5 + random.unit() * 10.0, 0.5 + random.unit() * 10.0);
     Land::new(Raster::new(columns, rows, spacing, heights).expect("sizes are valid"))
+}
+
+#[test]
+fn the_sea_keeps_its_promises() {
+    let mut random = Random(3);
+    let state = SeaState::of_wind(11.0, 1.0, 2e5).expect("a wind");
+    for (seed, level) in [(1, 0.0), (2, 3500.0)] {
+        let waves = Superposition::of_state(&SeaState { seed, ..state.clone() }, 8, 6).expect("a sea");
+        let datum = Datum::Plane { origin: DVec2::new(1e5, -3e4), size: DVec2::new(700.0, 500.0) };
+        let mut sea = Sea::new(datum, level).with(Box::new(waves));
+        for time in [0.0, 1234.5] {
+            sea.set_time(time);
+            check(&sea, 12, 250, &mut random);
+        }
+    }
 }
 
 #[test]

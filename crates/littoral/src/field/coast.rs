@@ -9,6 +9,7 @@ mod erosion;
 use super::noise::{Fbm, gradient};
 use super::{Land, Raster};
 use crate::space::View;
+use crate::waves::{SeaState, heading_from_bearing};
 use erosion::{Carving, Law};
 use glam::{DVec2, DVec3, UVec2};
 use rayon::prelude::*;
@@ -44,6 +45,14 @@ pub fn view(size: UVec2) -> View {
 /// Bearing and elevation of the sun that suits [`view`] (rad).
 pub fn sun() -> (f64, f64) {
     (254f64.to_radians(), 14f64.to_radians())
+}
+
+/// The sea that suits [`view`]: a moderate breeze and its waves out of the south-west.
+pub fn sea_state() -> SeaState {
+    match SeaState::beaufort(4.0, heading_from_bearing(225.0)) {
+        Ok(state) => state,
+        Err(error) => unreachable!("the coast's sea is fixed: {error}"),
+    }
 }
 
 /// How far inland a place lies (m), by the outline drawn by hand, bent by noise; negative at sea.

@@ -18,7 +18,7 @@ pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
-pub use sea::{Sea, Surface};
+pub use sea::{Finest, Sea, Surface};
 pub use water::Water;
 
 use crate::space::{Cell, Datum, Place};

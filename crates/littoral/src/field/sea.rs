@@ -7,7 +7,9 @@
 //!
 //! One function serves pictures, queries and meshes, so that a boat floats on the water that is seen.
 
-use super::{HeightField, HeightRange};
+mod build;
+
+use super::{HeightField, HeightRange, Land, Water};
 use crate::space::{Cell, Datum, Place};
 use crate::waves::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
 use glam::{DVec2, DVec3, Vec2, Vec3};
@@ -21,11 +23,21 @@ pub struct Sea {
     datum: Datum,
     bounds: Bounds,
     time: f64,
+    finest: Finest,
+}
+
+/// The ripples that are too fine for any model: slopes without heights.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Finest {
+    /// Variance of their slopes in each direction.
+    pub variance: f32,
+    /// Where they run to (rad, counter-clockwise from x).
+    pub heading: f64,
 }
 
 impl std::fmt::Debug for Sea {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Sea { models, level, datum, bounds, time } = self;
+        let Sea { models, level, datum, bounds, time, finest } = self;
         let models = models.len();
         f.debug_struct("Sea")
             .field("models", &models)
@@ -33,6 +45,7 @@ impl std::fmt::Debug for Sea {
             .field("datum", datum)
             .field("bounds", bounds)
             .field("time", time)
+            .field("finest", finest)
             .finish()
     }
 }
@@ -78,7 +91,12 @@ impl Sea {
 
     /// Still water at a level (m), to which models of waves may be added, over a datum, which must be a plane.
     pub fn new(datum: Datum, level: f64) -> Sea {
-        Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0 }
+        Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0, finest: Finest::default() }
+    }
+
+    /// The ripples that are too fine for its models.
+    pub fn finest(&self) -> Finest {
+        self.finest
     }
 
     /// The same with the waves of another model.
@@ -270,7 +288,11 @@ impl Sea {
         Surface {
             height: self.level + f64::from(m.dz[lane]),
             slope: Vec2::new((c * sx - b * sy) / area, (a * sy - b * sx) / area),
-            hidden: Vec3::new(m.hidden_xx[lane], m.hidden_xy[lane], m.hidden_yy[lane]),
+            hidden: Vec3::new(
+                m.hidden_xx[lane] + self.finest.variance,
+                m.hidden_xy[lane],
+                m.hidden_yy[lane] + self.finest.variance,
+            ),
             foam: m.foam[lane],
             rest: DVec2::new(found.rest.x[lane], found.rest.y[lane]),
             residual: found.residual[lane],

@@ -175,6 +175,38 @@ fn bell(x: f32) -> f32 {
     0.398_942_3 * (-0.5 * x * x).exp()
 }
 
+/// The x with a share of the normal distribution below it: the inverse of [`below`], to 5e-4 (Abramowitz and Stegun 26.2.23).
+fn quantile(share: f32) -> f32 {
+    let p = share.clamp(1e-6, 1.0 - 1e-6);
+    let t = (-2.0 * p.min(1.0 - p).ln()).sqrt();
+    let x =
+        t - (2.515_517 + t * (0.802_853 + t * 0.010_328)) / (1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308)));
+    if p < 0.5 { -x } else { x }
+}
+
+/// How much of a pixel of a footprint (m) is white where `cover` of the water about it is foam: a lace of strands and holes, carried by the water
+/// that rests at a place (m). In the mean over places it is `cover`.
+pub fn lace(rest: DVec2, footprint: f32, cover: f32) -> f32 {
+    if cover <= 0.002 {
+        return 0.0;
+    }
+    // Octaves of noise with their wavelengths and shares of the variance; what a pixel cannot show is normally distributed.
+    const OCTAVES: [(f32, f32); 6] = [(5.3, 0.16), (1.9, 0.24), (0.83, 0.24), (0.37, 0.18), (0.16, 0.11), (0.07, 0.07)];
+    // Mean square of the noise.
+    const NOISE: f32 = 0.074;
+    let (mut sum, mut left) = (0.0, 1.0f32);
+    for (i, (wavelength, share)) in OCTAVES.into_iter().enumerate() {
+        let shown = resolved(wavelength, footprint);
+        if shown == 0.0 {
+            break;
+        }
+        let turned = DVec2::from_angle(1.1 * i as f64).rotate(rest);
+        sum += patch(turned.extend(0.31), wavelength, footprint, 70 + i as u32) * (share / NOISE).sqrt();
+        left -= share * shown * shown;
+    }
+    below((sum - quantile(1.0 - cover)) / left.max(0.006).sqrt())
+}
+
 /// Share of the normal distribution below x, to 1e-7 (M. Abramowitz and I. Stegun, *Handbook of mathematical functions*, 1964, 26.2.17).
 fn below(x: f32) -> f32 {
     let tail = |x: f32| {
@@ -323,6 +355,22 @@ mod tests {
                 }
             }
             assert!((drawn - mean).length() < 4e-3, "{eye}: {drawn} for {mean}");
+        }
+    }
+
+    #[test]
+    fn lace_covers_as_much_as_it_should() {
+        for cover in [0.03, 0.2, 0.6] {
+            for footprint in [0.01, 0.3, 3.0] {
+                let n = 160;
+                let place = |i: i32| DVec2::new(f64::from(i % n) * 0.731, f64::from(i / n) * 0.593);
+                let sum: f32 = (0..n * n).map(|i| lace(place(i), footprint, cover)).sum();
+                let mean = sum / (n * n) as f32;
+                assert!((mean - cover).abs() < 0.015 + 0.06 * cover, "{cover} at {footprint}: {mean}");
+            }
+        }
+        for share in [0.001, 0.1, 0.5, 0.93] {
+            assert!((below(quantile(share)) - share).abs() < 5e-4);
         }
     }
 }

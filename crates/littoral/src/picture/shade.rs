@@ -8,7 +8,7 @@ use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, Site, natural};
 use super::sampler::Pattern;
-use super::sea::{Ripples, fresnel, glitter, refract, ripples};
+use super::sea::{Ripples, fresnel, glitter, lace, refract, ripples};
 use super::skylight::irradiance;
 use super::stage::{HIGHEST_EYE, Lens, Stage};
 use super::tile::FIRST;
@@ -330,12 +330,31 @@ impl Stage<'_> {
             shaded.sunlit = pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &ripples) * film);
             shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
         }
+        if let Some(wet) = wet.filter(|w| w.foam > 0.0) {
+            self.froth(&mut shaded, wet, self.footprint(lens, distance, eye.z));
+        }
         if pool.open < 1.0 {
             shaded.light = self.mist.lerp(shaded.light, pool.open);
             shaded.sunlit *= pool.open;
             shaded.mirror_share *= pool.open;
         }
         shaded
+    }
+
+    /// Covers water with its foam.
+    fn froth(&self, shaded: &mut Shaded, wet: &Wet, footprint: f32) {
+        /// What fresh foam throws back (C. Whitlock, D. Bartlett, E. Gurganus 1982, beyond the blue).
+        const WHITE: Vec3 = Vec3::new(0.58, 0.60, 0.62);
+        let white = lace(wet.rest, footprint, wet.foam);
+        if white <= 0.0 {
+            return;
+        }
+        let normal = normal_of_slope(wet.slope);
+        let sky = irradiance(&self.skylight.open, normal);
+        let sun = self.air.sunlight(0.0) * normal.dot(self.sun).max(0.0);
+        shaded.light = shaded.light.lerp(WHITE / PI * sky, white);
+        shaded.sunlit = shaded.sunlit.lerp(WHITE / PI * sun, white);
+        shaded.mirror_share *= 1.0 - white;
     }
 
     /// How much of what lies at a place beyond the raster is sea, in [0, 1]: as much as of the border next to it.

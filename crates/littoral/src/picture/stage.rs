@@ -11,6 +11,7 @@ use super::skylight::{Skylight, irradiance};
 use super::tile::{Mosaic, Pixel, TILE};
 use super::waves::Wet;
 use super::{Medium, Picture, Scene, Settings, Style};
+use crate::field::Sea;
 use crate::raycast::{LocalRay, RayCaster};
 use crate::space::View;
 use glam::{DVec3, UVec2, Vec3};
@@ -60,6 +61,8 @@ pub(super) struct Lens<'a> {
     pub pixel: f32,
     /// Casts rays whose origins count from the eye.
     pub caster: &'a dyn Caster,
+    /// The waves on the water.
+    pub sea: Option<&'a Sea>,
 }
 
 impl<'a> Stage<'a> {
@@ -88,13 +91,25 @@ impl<'a> Stage<'a> {
 
     /// What `view` sees. `progress` is told the fraction done, now and then, from any thread.
     pub fn render(&self, view: &View, settings: &Settings, progress: &(dyn Fn(f32) + Sync)) -> Picture {
-        self.render_with(&self.ground.land.caster(view.eye), view, settings, progress)
+        self.render_with(&self.ground.land.caster(view.eye), self.scene.sea, view, settings, progress)
+    }
+
+    /// What `view` sees with other waves than the scene's: a film takes the sea of each moment.
+    pub fn render_sea(
+        &self,
+        sea: Option<&Sea>,
+        view: &View,
+        settings: &Settings,
+        progress: &(dyn Fn(f32) + Sync),
+    ) -> Picture {
+        self.render_with(&self.ground.land.caster(view.eye), sea, view, settings, progress)
     }
 
     /// What `view` sees by the rays of some caster.
     pub(super) fn render_with(
         &self,
         caster: &dyn Caster,
+        sea: Option<&Sea>,
         view: &View,
         settings: &Settings,
         progress: &(dyn Fn(f32) + Sync),
@@ -104,6 +119,7 @@ impl<'a> Stage<'a> {
             eye: view.eye,
             pixel: 1.0 / view.pixels_per_radian,
             caster,
+            sea: sea.filter(|_| self.scene.water.is_some() && !self.is_map()),
         };
         let tiles = UVec2::new(view.size.x.div_ceil(TILE), view.size.y.div_ceil(TILE));
         let count = tiles.x as usize * tiles.y as usize;
@@ -148,7 +164,8 @@ impl<'a> Stage<'a> {
     }
 
     /// What a ray from the eye meets, where `ground` is its distance to the ground (m) and `wet` the sea before that.
-    pub(super) fn ahead(&self, eye: DVec3, direction: Vec3, ground: f32, wet: Option<Wet>) -> Ahead {
+    pub(super) fn ahead(&self, lens: &Lens, direction: Vec3, ground: f32, wet: Option<Wet>) -> Ahead {
+        let eye = lens.eye;
         let direction = direction.as_dvec3();
         let ground = f64::from(ground);
         if let Some(block) = &self.ground.block {
@@ -160,7 +177,7 @@ impl<'a> Stage<'a> {
         if let Some(wet) = wet {
             return Ahead::Water { position: wet.position, wet: Some(wet) };
         }
-        if let Some(water) = self.scene.water.filter(|_| self.scene.sea.is_none() && !self.is_map()) {
+        if let Some(water) = self.scene.water.filter(|_| lens.sea.is_none() && !self.is_map()) {
             // Still water is level; beyond the raster it bends with the Earth, which sets the horizon.
             let rise = eye.z - water.level;
             if rise > 0.0 {

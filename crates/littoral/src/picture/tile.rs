@@ -132,7 +132,7 @@ impl Stage<'_> {
             let mut near = Near::default();
             for s in samples.clone() {
                 let k = n * per_pixel + (s - samples.start) as usize;
-                let ahead = self.ahead(lens.eye, rays[k].direction, distances[k], wet.get(k).copied().flatten());
+                let ahead = self.ahead(lens, rays[k].direction, distances[k], wet.get(k).copied().flatten());
                 let sample = self.shade(lens, rays[k].direction, &ahead, pattern, s, &mut near);
                 if let Some(ray) = sample.shadow {
                     shadow_rays.push(ray);
@@ -172,8 +172,8 @@ impl Stage<'_> {
 
     /// Where rays meet the sea; empty where there is none.
     fn wet_all(&self, lens: &Lens, rays: &[LocalRay], distances: &[f32]) -> Vec<Option<Wet>> {
-        match (self.scene.sea, self.scene.water) {
-            (Some(sea), Some(water)) if !self.is_map() => {
+        match (lens.sea, self.scene.water) {
+            (Some(sea), Some(water)) => {
                 let mut wet = self.wet(lens, sea, rays, distances);
                 wet.iter_mut().for_each(|w| *w = w.filter(|w| water.covers(w.position.truncate())));
                 wet
@@ -195,7 +195,7 @@ impl Stage<'_> {
         lens.caster.first_hits(&rays, &mut distances);
         let wet = self.wet_all(lens, &rays, &distances);
         let seen = rays.iter().zip(&distances).enumerate().map(|(k, (ray, &distance))| {
-            match self.ahead(lens.eye, ray.direction, distance, wet.get(k).copied().flatten()) {
+            match self.ahead(lens, ray.direction, distance, wet.get(k).copied().flatten()) {
                 // Mist and floor stand for what is not known: nothing was measured there.
                 Ahead::Sky | Ahead::Mist { .. } | Ahead::Floor { .. } => None,
                 Ahead::Water { position, wet } => {
@@ -305,7 +305,7 @@ mod tests {
             let settings = Settings { samples: 6, seed };
             let by = |cast| {
                 let caster = OneByOne { land: &stage.ground.land, eye, cast };
-                stage.render_with(&caster, &view, &settings, &|_| {})
+                stage.render_with(&caster, None, &view, &settings, &|_| {})
             };
             let (pyramid, patches) = (by(Land::first_hit), by(Land::first_hit_patch_by_patch));
             assert!(bits(&pyramid) == bits(&patches), "seed {seed}: the pyramid changes the picture");

@@ -5,6 +5,7 @@
 //! narrower than what a pixel covers are left to the shading, as slopes.
 
 use super::atmosphere::EARTH;
+use super::grain::{grain, resolved};
 use super::sea::Ripples;
 use super::stage::{Lens, Stage};
 use crate::field::Sea;
@@ -23,6 +24,8 @@ pub struct Wet {
     pub hidden: Vec3,
     /// How much of it is foam, in [0, 1].
     pub foam: f32,
+    /// Where this water rests (m): foam drifts with it.
+    pub rest: DVec2,
 }
 
 impl Wet {
@@ -95,7 +98,7 @@ impl Stage<'_> {
             }
         });
         let place = |lane: usize, t: f64| origin(&rays[lane.min(rays.len() - 1)]) + lanes_direction(rays, lane) * t;
-        for _ in 0..STEPS {
+        for step in 0..STEPS {
             if !lanes.iter().any(|l| l.walking) {
                 break;
             }
@@ -119,7 +122,10 @@ impl Stage<'_> {
                         continue;
                     }
                     lane.above = (lane.at, clear);
-                    let least = 0.3 * f64::from(self.footprint(lens, lane.at as f32, -lane.direction.z as f32)) + 0.004;
+                    let footprint = f64::from(self.footprint(lens, lane.at as f32, -lane.direction.z as f32));
+                    // Waves at least two footprints long and no higher than the highest.
+                    let steep = steep.min(std::f64::consts::PI * reach / footprint);
+                    let least = footprint * (0.3 + 0.02 * step as f64) + 0.004;
                     lane.at += (clear / (-lane.direction.z + steep * flat).max(1e-3)).max(least);
                 }
                 if lane.above.0 >= lane.end {
@@ -128,6 +134,10 @@ impl Stage<'_> {
                     lane.at = lane.at.min(lane.end);
                 }
             }
+        }
+        // One that goes on and on between the waves, far away, has all but met them.
+        for lane in lanes.iter_mut().filter(|l| l.walking) {
+            lane.below = Some((lane.at, 0.0));
         }
         for _ in 0..CLOSE {
             for lane in &mut lanes {
@@ -168,7 +178,10 @@ impl Stage<'_> {
             let at = DVec2::new(points.x[i], points.y[i]);
             let surface = sea.surface(&found, i);
             let position = at.extend(surface.height - self.drop_at(at));
-            Some(Wet { position, slope: surface.slope, hidden: surface.hidden, foam: surface.foam })
+            let mut wet =
+                Wet { position, slope: surface.slope, hidden: surface.hidden, foam: surface.foam, rest: surface.rest };
+            shiver(sea, &mut wet, points.footprint[i]);
+            Some(wet)
         };
         (0..rays.len()).map(wet).collect()
     }
@@ -193,6 +206,30 @@ impl Stage<'_> {
             lane.offset = DVec2::new(f64::from(motion.dx[i]), f64::from(motion.dy[i]));
         }
         motion.dz.map(f64::from)
+    }
+}
+
+/// Ripples finer than the sea's models hold, as far as a pixel of a footprint (m) shows them: noise that runs with the wind and changes as it runs
+/// (K. Perlin's animated noise on the slopes of the water, as in the module of 1999).
+fn shiver(sea: &Sea, wet: &mut Wet, footprint: f32) {
+    /// Lengths (m), and how fast they run (m/s): gravity and tension together.
+    const RIPPLES: [(f32, f64); 3] = [(0.083, 0.37), (0.037, 0.26), (0.016, 0.23)];
+    /// Mean square slope of the noise, per direction.
+    const NOISE: f32 = 0.5;
+    let finest = sea.finest();
+    let along = DVec2::from_angle(finest.heading);
+    for (i, (wavelength, speed)) in RIPPLES.into_iter().enumerate() {
+        let share = resolved(wavelength, footprint);
+        if share == 0.0 || finest.variance == 0.0 {
+            break;
+        }
+        let turn = DVec2::from_angle(0.6 * i as f64 - 0.5).rotate(along);
+        let place = (wet.rest - turn * speed * sea.time()) / f64::from(wavelength);
+        let seen = grain(place.extend(sea.time() * 0.35 * speed / f64::from(wavelength)), 90 + i as u32).gradient;
+        let variance = finest.variance / RIPPLES.len() as f32;
+        wet.slope += Vec2::new(seen.x, seen.y) * ((variance / NOISE).sqrt() * share);
+        let shown = variance * share * share;
+        wet.hidden -= Vec3::new(shown, 0.0, shown);
     }
 }
 

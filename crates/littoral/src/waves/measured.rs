@@ -59,6 +59,13 @@ impl Measured {
         Ok(Measured { bands })
     }
 
+    /// The same with all directions turned counter-clockwise by an angle (rad).
+    pub fn turned(&self, angle: f64) -> Measured {
+        let turn = |c: [f64; 2], by: f64| times(c, [cos(by), sin(by)]);
+        let turned = |b: &Band| Band { first: turn(b.first, angle), second: turn(b.second, 2.0 * angle), ..*b };
+        Measured { bands: self.bands.iter().map(turned).collect() }
+    }
+
     /// The bands, by rising frequency.
     pub fn bands(&self) -> &[Band] {
         &self.bands
@@ -183,6 +190,17 @@ mod tests {
         let band = Band::of_bearings(0.1, 1.0, 1.5 * TAU / 2.0, 1.5 * TAU / 2.0, 0.9, 0.6);
         assert!((band.first[0] - 0.9).abs() < 1e-12 && band.first[1].abs() < 1e-12);
         assert!((band.second[0] - 0.6).abs() < 1e-12);
+    }
+
+    #[test]
+    fn turning_turns_directions() {
+        let band = |frequency| Band { frequency, density: 1.0, first: [0.6, 0.1], second: [0.3, -0.2] };
+        let sea = Measured::new(vec![band(0.1), band(0.2)]).expect("fine");
+        let turned = sea.turned(0.8);
+        for direction in [0.0, 1.0, 4.0] {
+            let (a, b) = (sea.directions(0.1).density(direction), turned.directions(0.1).density(direction + 0.8));
+            assert!((a / b - 1.0).abs() < 1e-9);
+        }
     }
 
     #[test]

@@ -8,25 +8,32 @@
 //! time is in seconds. Everything random comes from a seed by counting ([`random`]) and every elementary function from one library in Rust, so
 //! that a sea has the same bits on every platform.
 
+pub mod cascades;
 pub mod components;
 mod dispersion;
+mod fft;
 mod measured;
 mod model;
 pub mod random;
+mod sheltered;
 pub mod shore;
 pub mod spec;
 mod spectrum;
 mod spreading;
 mod state;
+mod sum;
+mod superposition;
 
 pub use components::PlaneWave;
 pub use dispersion::{STANDARD_GRAVITY, SURFACE_TENSION, StillWater};
 pub use measured::{Band, Entropy, Measured};
 pub use model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
+pub use sheltered::{Shelter, Sheltered};
 pub use shore::{Bed, ShoreError, ShoreSea};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};
 pub use state::{SeaState, Slice, Train, Wind, bearing_from_heading, heading_from_bearing};
+pub use superposition::Superposition;
 
 /// A number that makes no sense where it was given.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

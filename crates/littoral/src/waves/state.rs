@@ -204,6 +204,18 @@ impl SeaState {
         Ok(self)
     }
 
+    /// The same with wind and waves turned counter-clockwise by an angle (rad): for axes of which y is not north.
+    pub fn turned(mut self, angle: f64) -> SeaState {
+        self.wind.heading += angle;
+        for train in &mut self.trains {
+            match train {
+                Train::Formula { heading, .. } => *heading += angle,
+                Train::Measured(measured) => *measured = measured.turned(angle),
+            }
+        }
+        self
+    }
+
     /// The same if all of its numbers make sense.
     ///
     /// # Errors
