@@ -9,8 +9,16 @@
 //! Near the shore waves are no sines: their sum takes the shape of T. Abreu et al. 2010, crests sharp, troughs flat, fronts steep,
 //! by as much as B. Ruessink, G. Ramaekers and L. van Rijn 2012 measured for the Ursell number of the place (see `shape`).
 //!
-//! What is approximate: waves run forward only (none comes back from a cliff), and each within some 70° of the side of the grid nearest to its
-//! heading; waves shorter than some three nodes shorten no further; currents and the wind over the shoal are not there.
+//! *How right it is* (`tests/shore.rs`). On a plane beach Snell's and Green's laws hold within 0.1 %, the flux of energy over shoals within 1.2 %.
+//! Behind a half-plane the amplitude is that of A. Sommerfeld's soft screen to 0.03 (rms; 0.08 at worst) of the incoming one within 45° of the
+//! shadow's edge. Round an island phases are within 1 % (rms) of those of a fine solution in time, everywhere but deep in the lee. Phases are kept
+//! to 5·10⁻⁵ rad and amplitudes to 6·10⁻⁵ of the incoming ones; linear interpolation of phases errs by an eighth of what the step of the relative
+//! phase from node to node changes by: 10⁻³ rad in 2 m of water on a slope of 1 : 30 with nodes 2 m apart. Slopes are the exact derivative
+//! of that surface, which has a kink of the same order at the borders of cells.
+//!
+//! *What is approximate.* Waves run forward only (none comes back from a cliff). Each marches along the side of the grid nearest to its
+//! heading, at most 45° off, about its own direction by Snell's law; what turns further than some 75° from that side is lost. Waves shorten to no
+//! less than what a grid resolves: their wave number grows by at most 2.4 per node. Currents and the wind over the shoal are not there.
 
 mod bed;
 mod lanes;
@@ -144,7 +152,7 @@ pub struct ShoreSea {
     lace: shape::Lace,
     time: f64,
     bounds: Bounds,
-    /// Largest amplitude (m) of each component by the binary logarithm of its local wavelength, 8 bins from 1 m up.
+    /// Largest amplitude (m) of each component by octaves of its local wavelength.
     by_length: Vec<[f32; BINS]>,
     /// Scratch: sums of slopes by cell.
     steepness: Vec<f32>,
@@ -345,6 +353,7 @@ impl ShoreSea {
         const NONE: u32 = u32::MAX;
         let (columns, rows, blocks) = (self.columns, self.rows, self.blocks);
         let last = (REACH / self.spacing.min_element()).ceil().clamp(2.0, 40.0) as u32;
+        let fade = libm::exp(-self.spacing.min_element() / (0.4 * REACH)) as f32;
         let near = &self.scratch.grid.near;
         let rings = &mut self.rings;
         rings.clear();
@@ -388,8 +397,10 @@ impl ShoreSea {
                 for &n in &around {
                     place.0.iter_mut().zip(self.places[n].0).for_each(|(sum, value)| *sum += value / count as f32);
                 }
-                // Rollers do not climb the beach.
+                // Rollers do not climb the beach, and what swash may reach ends somewhere.
                 place.0[Place::BROKEN] *= 0.7;
+                place.0[Place::SETUP] *= fade;
+                place.0[Place::SWING] *= fade;
                 self.places[i] = place;
                 rings[i] = ring;
                 false
