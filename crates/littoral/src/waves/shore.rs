@@ -514,7 +514,7 @@ impl WaveModel for ShoreSea {
         if wavelength.is_nan() || wavelength <= 0.0 {
             return 0.0;
         }
-        let bins = (wavelength.log2().ceil().max(0.0) as usize + 1).min(BINS);
+        let bins = measure::octave(wavelength) + 1;
         let sum: f32 = self.by_length.iter().map(|bins_of| bins_of[..bins].iter().copied().fold(0.0, f32::max)).sum();
         // Below the lowest bin with the length itself.
         let left = if wavelength < 1.0 { wavelength } else { 1.0 };

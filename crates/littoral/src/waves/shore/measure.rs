@@ -223,7 +223,7 @@ fn cell(sea: &ShoreSea, corners: [Option<usize>; 4], [height, slope, curvature]:
 }
 
 /// The bin of a wavelength (m).
-fn octave(wavelength: f32) -> usize {
+pub(super) fn octave(wavelength: f32) -> usize {
     // The exponent of a float is the integral part of its binary logarithm.
     let exponent = ((wavelength.to_bits() >> 23) & 0xFF) as i32 - 127;
     (exponent + 1).clamp(0, BINS as i32 - 1) as usize
