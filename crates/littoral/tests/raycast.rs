@@ -476,6 +476,107 @@ fn single_rays_equal_the_exact_walk_on_large_maps() {
     }
 }
 
+/// Maps with coarse levels, from far above the ground to below it, from beside the map and over all lengths: held against
+/// the stream that is held against brute force.
+#[test]
+fn lines_of_sight_equal_streams_on_large_maps() {
+    for (seed, columns, rows, spacing) in [(1, 40, 33, 9.0), (2, 258, 71, 30.0), (3, 700, 650, 7.3), (4, 3000, 90, 2.0)]
+    {
+        let mut state = u64::from(seed);
+        let mut random = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let noise = littoral::field::noise::Fbm::new(180.0 * spacing, 25.0 * spacing, 7, seed);
+        let place = |i: usize| DVec2::new((i % columns) as f64, (i / columns) as f64) * spacing;
+        let heights = (0..columns * rows).map(|i| noise.at(place(i)).value as f32).collect();
+        let land =
+            Land::at(Raster::new(columns, rows, DVec2::splat(spacing), heights).expect("valid"), DVec2::new(9e5, -7e4));
+        let anchor = (land.origin() + 0.3 * land.extent()).extend(10.0);
+        let segments: Vec<[Vec3; 2]> = (0..if cfg!(miri) { 30 } else { 20_000 })
+            .map(|n| {
+                let mut end = |near: Option<DVec2>| {
+                    let at = DVec2::new(random(), random());
+                    let at = match near {
+                        Some(near) if n % 3 == 0 => near + (at - 0.5) * 20.0 * spacing,
+                        // One in five beside the map.
+                        _ if n % 5 == 0 => land.origin() + land.extent() * (at * 1.6 - 0.3),
+                        _ => land.origin() + land.extent() * at,
+                    };
+                    let inside = (at - land.origin()).clamp(DVec2::ZERO, land.extent() * 0.999) + land.origin();
+                    let ground = f64::from(land.height_at(inside).expect("on the map"));
+                    at.extend(ground + spacing * 30.0 * (random() * random() - 0.04))
+                };
+                let from = end(None);
+                let to = end(Some(from.truncate()));
+                [from, to].map(|end| (end - anchor).as_vec3())
+            })
+            .collect();
+        let rays: Vec<LocalRay> = segments.iter().map(|[from, to]| LocalRay::between(*from, *to)).collect();
+        for simd in [Simd::Portable, Simd::Avx2, Simd::Avx512].into_iter().filter(|simd| simd.available()) {
+            let caster = land.caster(anchor).with_simd(simd);
+            let (mut visible, mut hits) = (vec![false; segments.len()], vec![false; segments.len()]);
+            caster.lines_of_sight(&segments, &mut visible);
+            caster.any_hits(&rays, &mut hits);
+            let blocked = hits.iter().filter(|hit| **hit).count();
+            assert!(cfg!(miri) || (2000..18_000).contains(&blocked), "{blocked} blocked on {columns} × {rows}");
+            for (segment, (visible, hit)) in segments.iter().zip(visible.iter().zip(&hits)) {
+                assert!(visible != hit, "{segment:?} by {simd:?} on {columns} × {rows}: visible {visible}");
+            }
+        }
+    }
+}
+
+/// Views over maps of many patches, near and far, held against the exact walk; and every set of instructions against the
+/// others.
+#[test]
+fn views_equal_the_exact_walk_on_large_maps() {
+    let (columns, rows) = (700, 650);
+    let noise = littoral::field::noise::Fbm::new(1200.0, 160.0, 7, 5);
+    let place = |i: usize| DVec2::new((i % columns) as f64, (i / columns) as f64) * 7.3;
+    let heights = (0..columns * rows).map(|i| noise.at(place(i)).value as f32).collect();
+    let land = Land::at(Raster::new(columns, rows, DVec2::splat(7.3), heights).expect("valid"), DVec2::new(9e5, -7e4));
+    let at = |x: f64, y: f64, up: f64| {
+        let xy = land.origin() + land.extent() * DVec2::new(x, y);
+        xy.extend(f64::from(land.height_at(xy.clamp(land.origin(), land.origin() + land.extent())).expect("land")) + up)
+    };
+    let size = if cfg!(miri) { UVec2::new(9, 6) } else { UVec2::new(150, 100) };
+    for (from, to) in [
+        (at(0.1, 0.1, 3.0), at(0.3, 0.35, 0.0)),
+        (at(0.9, 0.4, 60.0), at(0.2, 0.5, 0.0)),
+        (at(0.5, 0.9, 900.0), at(0.45, 0.5, 0.0)),
+        (at(0.6, -0.2, 300.0), at(0.4, 0.8, 0.0)),
+        (at(0.5, 0.5, 2000.0), at(0.501, 0.502, 0.0)),
+    ] {
+        let view = View::looking_at(from, to, 0.8, size);
+        let (corner, right, down) = view.frame();
+        let mut distances = vec![0.0; (size.x * size.y) as usize];
+        land.caster(from).view_hits(&view, Vec2::splat(0.5), 0..size.y, &mut distances);
+        for simd in [Simd::Portable, Simd::Avx2].into_iter().filter(|simd| simd.available()) {
+            let mut again = vec![0.0; distances.len()];
+            land.caster(from).with_simd(simd).view_hits(&view, Vec2::splat(0.5), 0..size.y, &mut again);
+            assert_eq!(again, distances, "{simd:?} differs");
+        }
+        let (mut hits, mut apart) = (0, 0);
+        for (i, got) in distances.into_iter().enumerate() {
+            let (x, y) = ((i as u32 % size.x) as f32 + 0.5, (i as u32 / size.x) as f32 + 0.5);
+            let exact = Ray::new(from, (corner + right * x + down * y).as_dvec3());
+            let want = land.first_hit(&exact).map_or(f64::INFINITY, |hit| hit.distance);
+            let (got, length) = (f64::from(got), exact.direction.length());
+            hits += usize::from(got.is_finite());
+            if got != want && ((got - want) * length).abs() > 2e-3 + 2e-6 * want * length {
+                // A ray that grazes may pass by a hair.
+                apart += 1;
+                let point = exact.at(got.min(want));
+                let height = land.height_at(point.truncate()).expect("a hit is on the map");
+                assert!((point.z - f64::from(height)).abs() < 0.01, "{got} instead of {want} for {exact:?}");
+            }
+        }
+        assert!(cfg!(miri) || hits > 2000, "only {hits} hits from {from}");
+        assert!(apart < 20, "{apart} rays graze from {from}");
+    }
+}
+
 #[test]
 fn nonsense_meets_nothing() {
     let land = land(3, 17, 9, DVec2::ONE, Ground::Steep, 0);

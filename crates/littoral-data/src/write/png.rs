@@ -53,7 +53,9 @@ fn encode(
     let mut encoder = png::Encoder::new(sink, width, height);
     encoder.set_color(colour);
     encoder.set_depth(depth);
-    encoder.set_compression(png::Compression::Balanced);
+    // Pictures are noisy: a thirtieth of the time for a tenth more bytes. Heights and the like compress well, if one tries.
+    let picture = matches!(pixels, PngPixels::Rgb8(_));
+    encoder.set_compression(if picture { png::Compression::Fast } else { png::Compression::Balanced });
     if colour == png::ColorType::Rgb {
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     }

@@ -12,14 +12,16 @@ mod pyramid;
 mod raster;
 mod sea;
 mod water;
+mod windows;
 
-pub(crate) use blocks::{BLOCK_LEVELS, Block, Blocks};
+pub(crate) use blocks::{BLOCK_LEVELS, Block};
 pub use deviation::ErrorPyramid;
 pub use land::Land;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
 pub use sea::{Finest, Sea, Surface};
 pub use water::Water;
+pub(crate) use windows::FINEST_WINDOWS;
 
 use crate::space::{Cell, Datum, Place};
 

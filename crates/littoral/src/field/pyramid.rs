@@ -5,12 +5,13 @@
 //! bilinear patch never leaves the range of its corners). Level 0, the patches, is not stored: their corners say it.
 //! Patches with a void corner have no surface and count for nothing; a node without any surface is empty. Ranges are
 //! kept as 16-bit steps rounded outward, low and high apart because most rays only ask for one: 1.33 bytes a sample, and
-//! 0.13 for the blocks that single rays go by.
+//! 0.17 for the blocks and windows that single rays and lines of sight go by.
 //!
 //! Works this rests on: A. Tevs, I. Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and scalable dynamic height
 //! field rendering", I3D 2008; spec page 004, "The height map as a shape texture", for the pyramid by itself.
 
 use super::blocks::Blocks;
+use super::windows::Windows;
 use super::{HeightRange, Raster, Window};
 use rayon::prelude::*;
 
@@ -43,6 +44,8 @@ pub struct RangePyramid {
     pub(crate) highs: Vec<u16>,
     /// The same highs in blocks.
     pub(crate) blocks: Blocks,
+    /// The same highs over windows of nodes.
+    pub(crate) windows: Windows,
 }
 
 /// What an empty node holds: a low above every high …
@@ -69,7 +72,8 @@ impl RangePyramid {
             }
         }
         let (lows, highs) = (vec![0; offset + 1], vec![0; offset + 1]);
-        let mut pyramid = RangePyramid { base, step, range, levels, lows, highs, blocks: Blocks::default() };
+        let (blocks, windows) = (Blocks::default(), Windows::default());
+        let mut pyramid = RangePyramid { base, step, range, levels, lows, highs, blocks, windows };
         let first = pyramid.levels[0];
         let (lows, highs) = (&mut pyramid.lows[..first.columns * first.rows], &mut pyramid.highs[..]);
         let kernel = Kernel { base, step };
@@ -88,6 +92,7 @@ impl RangePyramid {
             pyramid.reduce(n, Window { column: 0, row: 0, columns, rows });
         }
         pyramid.blocks = Blocks::new(raster, &pyramid.levels, &pyramid.highs);
+        pyramid.windows = Windows::new(&pyramid.levels, &pyramid.highs);
         pyramid
     }
 
@@ -137,7 +142,7 @@ impl RangePyramid {
 
     /// Bytes of memory held.
     pub fn bytes(&self) -> usize {
-        2 * (self.lows.len() + self.highs.len()) + self.blocks.bytes()
+        2 * (self.lows.len() + self.highs.len()) + self.blocks.bytes() + self.windows.bytes()
     }
 
     /// Brings up to date what depends on the samples of `window`, which held values of the range `before`.
@@ -177,6 +182,7 @@ impl RangePyramid {
             self.reduce(n, nodes(n + 1));
         }
         self.blocks.edited(nodes(0), &self.levels, &self.highs);
+        self.windows.edited(nodes(0), &self.levels, &self.highs);
     }
 
     /// Recomputes the nodes `window` of `levels[n]` from those of `levels[n - 1]`.

@@ -24,7 +24,22 @@ pub struct Sea {
     bounds: Bounds,
     time: f64,
     finest: Finest,
+    rises: [Rise; OCTAVES],
 }
+
+/// How fast the surface can be expected to rise over a distance d: by no more than `jump` + `slope` · d, all but never.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Rise {
+    /// What waves shorter than some length rise at once (m).
+    pub jump: f32,
+    /// How steep the others are.
+    pub slope: f32,
+}
+
+/// Lengths at which waves are told short from long, each twice the one before.
+const OCTAVES: usize = 12;
+/// The shortest of them (m).
+const SHORTEST: f32 = 0.125;
 
 /// The ripples that are too fine for any model: slopes without heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -37,7 +52,7 @@ pub struct Finest {
 
 impl std::fmt::Debug for Sea {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Sea { models, level, datum, bounds, time, finest } = self;
+        let Sea { models, level, datum, bounds, time, finest, .. } = self;
         let models = models.len();
         f.debug_struct("Sea")
             .field("models", &models)
@@ -46,7 +61,7 @@ impl std::fmt::Debug for Sea {
             .field("bounds", bounds)
             .field("time", time)
             .field("finest", finest)
-            .finish()
+            .finish_non_exhaustive()
     }
 }
 
@@ -91,7 +106,15 @@ impl Sea {
 
     /// Still water at a level (m), to which models of waves may be added, over a datum, which must be a plane.
     pub fn new(datum: Datum, level: f64) -> Sea {
-        Sea { models: Vec::new(), level, datum, bounds: Bounds::default(), time: 0.0, finest: Finest::default() }
+        Sea {
+            models: Vec::new(),
+            level,
+            datum,
+            bounds: Bounds::default(),
+            time: 0.0,
+            finest: Finest::default(),
+            rises: [Rise::default(); OCTAVES],
+        }
     }
 
     /// The ripples that are too fine for its models.
@@ -141,6 +164,24 @@ impl Sea {
                 bend: sum.bend + b.bend,
             }
         });
+        // Roughness is about six standard deviations: slopes of 3½ are all but never passed.
+        let length = |octave: usize| SHORTEST * (1u32 << octave) as f32;
+        let rough = |wavelength: f32| self.models.iter().map(|m| m.roughness(wavelength)).sum::<f32>();
+        let mut square = 0.0;
+        let mut above = self.bounds.height;
+        for octave in (0..OCTAVES).rev() {
+            let (below, wavenumber) = (rough(length(octave)), std::f32::consts::TAU / length(octave));
+            // Waves between this length and twice it.
+            square += (above * above - below * below).max(0.0) * (wavenumber * wavenumber) * (3.5f32 / 6.0).powi(2);
+            let slope = square.sqrt().min(self.bounds.slope);
+            self.rises[octave] = Rise { jump: 1.2 * below, slope };
+            above = below;
+        }
+    }
+
+    /// How the surface can be expected to rise: for short distances the first of these is the least, for long ones the last.
+    pub(crate) fn rises(&self) -> &[Rise] {
+        &self.rises
     }
 
     /// Height of the water (m above the datum) at a place (m).

@@ -10,6 +10,8 @@
 
 use super::Land;
 use glam::DVec2;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// A still body of water over land.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,49 +45,68 @@ impl Water {
             true => sea.get(i) == Some(&true),
             false => f64::from(heights[i]) <= level,
         };
-        let mut reach = vec![DRY; columns * rows];
-        let mut queue: Vec<usize> = Vec::new();
-        let mut open = [false; 4];
-        for row in 0..rows {
+        // Runs of low samples within rows, and those that touch each other, corners too, as trees; tree 0 is what lies beyond
+        // the border.
+        let runs_of = |row: usize| {
+            let (mut runs, mut start) = (Vec::new(), None);
             for column in 0..columns {
-                let edges = [column == 0, column == columns - 1, row == 0, row == rows - 1];
-                let i = row * columns + column;
-                if low(i) && edges.contains(&true) {
-                    for (open, edge) in open.iter_mut().zip(edges) {
-                        *open |= edge;
+                match (low(row * columns + column), start) {
+                    (true, None) => start = Some(column),
+                    (false, Some(first)) => {
+                        runs.push(first..column);
+                        start = None;
                     }
-                    reach[i] = FLOODED;
-                    queue.push(i);
+                    _ => {}
                 }
             }
-        }
-        let mut flooded = queue.len();
-        while let Some(i) = queue.pop() {
-            let (column, row) = (i % columns, i / columns);
-            for r in row.saturating_sub(1)..(row + 2).min(rows) {
-                for c in column.saturating_sub(1)..(column + 2).min(columns) {
-                    let j = r * columns + c;
-                    if reach[j] != FLOODED && low(j) {
-                        reach[j] = FLOODED;
-                        flooded += 1;
-                        queue.push(j);
-                    }
+            runs.extend(start.map(|first| first..columns));
+            runs
+        };
+        let runs: Vec<Vec<Range<usize>>> = (0..rows).into_par_iter().map(runs_of).collect();
+        let mut trees = Trees(vec![0]);
+        let mut open = [false; 4];
+        let mut above = 1;
+        for (row, here) in runs.iter().enumerate() {
+            let below = if row == 0 { &[] } else { runs[row - 1].as_slice() };
+            let (first, mut next) = (trees.0.len(), 0);
+            for (k, run) in here.iter().enumerate() {
+                trees.0.push(first + k);
+                let edges = [run.start == 0, run.end == columns, row == 0, row == rows - 1];
+                if edges.contains(&true) {
+                    open.iter_mut().zip(edges).for_each(|(open, edge)| *open |= edge);
+                    trees.join(first + k, 0);
                 }
+                while next < below.len() && below[next].end < run.start {
+                    next += 1;
+                }
+                let touching = (next..below.len()).take_while(|&other| below[other].start <= run.end);
+                touching.for_each(|other| trees.join(first + k, above + other));
+            }
+            above = first;
+        }
+        let mut wet = Vec::new();
+        let mut number = 1;
+        for (row, here) in runs.iter().enumerate() {
+            for run in here {
+                if trees.root(number) == 0 {
+                    wet.push((row, run.clone()));
+                }
+                number += 1;
             }
         }
-        if flooded == 0 {
+        if wet.is_empty() {
             return None;
         }
-        for i in 0..columns * rows {
-            if reach[i] == FLOODED {
-                let (column, row) = (i % columns, i / columns);
-                for r in row.saturating_sub(1)..(row + 2).min(rows) {
-                    for beside in
-                        &mut reach[r * columns + column.saturating_sub(1)..r * columns + (column + 2).min(columns)]
-                    {
-                        *beside = (*beside).max(BESIDE);
-                    }
-                }
+        let mut reach = vec![DRY; columns * rows];
+        let mut flooded = 0;
+        for (row, run) in &wet {
+            reach[row * columns..][run.clone()].fill(FLOODED);
+            flooded += run.len();
+        }
+        for (row, run) in wet {
+            for row in row.saturating_sub(1)..(row + 2).min(rows) {
+                let around = run.start.saturating_sub(1)..(run.end + 1).min(columns);
+                reach[row * columns..][around].iter_mut().for_each(|beside| *beside = (*beside).max(BESIDE));
             }
         }
         Some(Water { level, columns, rows, origin: land.origin(), spacing: raster.spacing(), reach, flooded, open })
@@ -125,6 +146,24 @@ impl Water {
         }
         let nearest = lattice.round();
         self.reach[nearest.y as usize * self.columns + nearest.x as usize] != DRY
+    }
+}
+
+/// Things that belong together, each with one that stands for it, at the end with the least of all.
+struct Trees(Vec<usize>);
+
+impl Trees {
+    fn root(&mut self, mut thing: usize) -> usize {
+        while self.0[thing] != thing {
+            self.0[thing] = self.0[self.0[thing]];
+            thing = self.0[thing];
+        }
+        thing
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
     }
 }
 
@@ -197,6 +236,68 @@ mod tests {
         assert!(!water.covers(DVec2::ZERO), "behind the dike");
         assert!(water.covers(DVec2::new(-3.0, 0.0)) && water.covers(DVec2::new(50.0, 0.0)));
         assert_eq!(water.flooded, 24);
+    }
+
+    /// Sample by sample from the border, as one would say it.
+    fn flood_by_samples(land: &Land, level: f64) -> Vec<bool> {
+        let raster = land.raster();
+        let (columns, rows) = (raster.columns(), raster.rows());
+        let mut wet = vec![false; columns * rows];
+        let border =
+            |i: &usize| i % columns == 0 || i % columns == columns - 1 || i / columns == 0 || i / columns == rows - 1;
+        let mut queue: Vec<usize> = (0..columns * rows).filter(border).collect();
+        while let Some(i) = queue.pop() {
+            if wet[i] || f64::from(raster.heights()[i]) > level {
+                continue;
+            }
+            wet[i] = true;
+            let (column, row) = (i % columns, i / columns);
+            for r in row.saturating_sub(1)..(row + 2).min(rows) {
+                queue.extend((column.saturating_sub(1)..(column + 2).min(columns)).map(|c| r * columns + c));
+            }
+        }
+        wet
+    }
+
+    #[test]
+    fn runs_flood_what_samples_do() {
+        let mut state = 88_172_645_463_325_252u64;
+        let mut next = || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 40) as f32 / (1u64 << 24) as f32
+        };
+        for _ in 0..400 {
+            let (columns, rows) = (2 + (next() * 24.0) as usize, 2 + (next() * 24.0) as usize);
+            let share = 0.3 + 0.4 * next();
+            let heights = (0..columns * rows).map(|_| next() - share).collect();
+            let land = Land::new(Raster::new(columns, rows, DVec2::ONE, heights).expect("valid"));
+            let wet = flood_by_samples(&land, 0.0);
+            let Some(water) = Water::flood(&land, 0.0) else {
+                assert!(!wet.contains(&true));
+                continue;
+            };
+            assert_eq!(water.flooded, wet.iter().filter(|wet| **wet).count());
+            let mut open = [false; 4];
+            for (i, &flooded) in wet.iter().enumerate() {
+                let (column, row) = (i % columns, i / columns);
+                let around =
+                    |r: usize| (column.saturating_sub(1)..(column + 2).min(columns)).any(|c| wet[r * columns + c]);
+                let beside = (row.saturating_sub(1)..(row + 2).min(rows)).any(around);
+                let expected = if flooded {
+                    FLOODED
+                } else if beside {
+                    BESIDE
+                } else {
+                    DRY
+                };
+                assert_eq!(water.reach[i], expected, "sample {i} of {columns} × {rows}");
+                let edges = [column == 0, column == columns - 1, row == 0, row == rows - 1];
+                open.iter_mut().zip(edges).for_each(|(open, edge)| *open |= edge && flooded);
+            }
+            assert_eq!(water.open, open);
+        }
     }
 
     #[test]

@@ -123,10 +123,13 @@ impl Stage<'_> {
                     }
                     lane.above = (lane.at, clear);
                     let footprint = f64::from(self.footprint(lens, lane.at as f32, -lane.direction.z as f32));
-                    // Waves at least two footprints long and no higher than the highest.
+                    // As far as no waves can be expected to rise; those no longer than two footprints are not there.
                     let steep = steep.min(std::f64::consts::PI * reach / footprint);
+                    let safe = |jump: f64, slope: f64| (clear - jump) / (slope * flat - lane.direction.z).max(1e-3);
+                    let rises = sea.rises().iter();
+                    let far = rises.fold(safe(0.0, steep), |d, r| d.max(safe(f64::from(r.jump), f64::from(r.slope))));
                     let least = footprint * (0.3 + 0.02 * step as f64) + 0.004;
-                    lane.at += (clear / (-lane.direction.z + steep * flat).max(1e-3)).max(least);
+                    lane.at += far.max(least);
                 }
                 if lane.above.0 >= lane.end {
                     lane.walking = false;

@@ -5,7 +5,7 @@ use super::camera::ViewRays;
 use super::lanes::{Avx2, Avx512};
 use super::lanes::{Lanes, Portable};
 use super::scene::Scene;
-use super::single::{Found, Single};
+use super::single::Single;
 use super::stream::{self, BLOCK, LocalRay, Prepared, Rays};
 use super::walk;
 use crate::field::Land;
@@ -93,10 +93,9 @@ impl<'a> RayCaster<'a> {
             self.first_hits(std::slice::from_ref(ray), &mut distance);
             return distance[0];
         }
-        match self.single.as_ref().map_or(Found::Left, |single| single.first_hit(self.simd == Simd::Avx512, ray)) {
-            Found::Distance(distance) => distance,
-            Found::Left => self.exact(ray),
-        }
+        let wide = self.simd == Simd::Avx512;
+        let distance = self.single.as_ref().map_or(f32::NAN, |single| single.first_hit(wide, ray));
+        if distance.is_nan() { self.exact(ray) } else { distance }
     }
 
     /// Whether one ray meets the surface anywhere from its origin to its reach.
@@ -362,7 +361,7 @@ impl<T: Copy, const FOOTPRINT: bool> Rays for Stream<'_, T, FOOTPRINT> {
 }
 
 /// Runs the kernel compiled for `simd`.
-fn dispatch<R: Rays, const SHEET: bool, const ANY: bool>(simd: Simd, scene: &Scene, rays: &mut R) {
+pub(super) fn dispatch<R: Rays, const SHEET: bool, const ANY: bool>(simd: Simd, scene: &Scene, rays: &mut R) {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx512f,avx512dq,avx2,bmi1,bmi2,popcnt,lzcnt")]

@@ -2,8 +2,9 @@
 //!
 //! A *beam* is the bundle of rays through a square of pixels. As far as its lowest ray stays above the highest point of
 //! all nodes below the beam, none of its rays can meet anything. Beams of 16² pixels march first, sixteen at once, one in
-//! each lane; beams of 4² pixels go on from where theirs stopped; the rays of each then start their own walk there. A
-//! step is a bar of the beam about as long as a node is wide, and looks at the 2 × 2 nodes that its footprint can touch:
+//! each lane; beams of 4² pixels go on from where theirs stopped; from there the sixteen rays of each walk together
+//! (`tile.rs`) as long as they see the same patches, and those left over walk by themselves in the stream. A step of the
+//! march is a bar of the beam about as long as a node is wide, and looks at the 2 × 2 nodes that its footprint can touch:
 //! longer after a success, shorter after a failure, until it would be no longer than the beam is wide.
 //!
 //! Works this rests on: spec page 004 (the bar halved along its depth); J. Amanatides, "Ray tracing with cones", SIGGRAPH
@@ -11,14 +12,17 @@
 
 use super::lanes::Lanes;
 use super::scene::Scene;
-use super::stream::{Prepared, Rays, absolute};
+use super::stream::{BLOCK, Prepared, Rays, absolute};
+use super::tile::{self, Beam, Outcome};
 use glam::{Vec2, Vec3};
 use std::ops::Range;
 
 /// Side of a tile, of a coarse and of a fine beam (pixels).
 const TILE: u32 = 64;
 const COARSE: u32 = 16;
-const FINE: u32 = 4;
+const FINE: u32 = tile::SIDE as u32;
+/// Width of a fine beam (cells) up to which its rays see few enough patches to walk together.
+const TOGETHER: f32 = 2.5;
 const FINE_IN_TILE: usize = ((TILE / FINE) * (TILE / FINE)) as usize;
 
 /// The id of a ray beyond the picture's edge: no index of a slice.
@@ -44,10 +48,43 @@ pub(super) struct ViewRays<'a, const FOOTPRINT: bool> {
     /// How wide rays are (pixels), if they are walked by footprint.
     pub pixels: f32,
     tile: u32,
-    /// Next 8 × 8 pixels of the tile.
-    group: u32,
+    /// Next fine beam of the tile, row by row.
+    fine: u32,
     starts: [f32; FINE_IN_TILE],
     levels: [i32; FINE_IN_TILE],
+    left: Left,
+}
+
+/// Rays that are left to the stream: their pixels, and where and at which level they start. Fewer than a beam's, and room for
+/// another one's.
+struct Left {
+    count: usize,
+    x: [i32; 32],
+    y: [i32; 32],
+    from: [f32; 32],
+    level: [i32; 32],
+}
+
+impl Left {
+    fn new() -> Left {
+        let (numbers, integers) = ([0.0; 32], [0; 32]);
+        Left { count: 0, x: integers, y: integers, from: numbers, level: integers }
+    }
+
+    fn push(&mut self, (x, y): (u32, u32), from: f32, level: i32) {
+        let at = self.count;
+        (self.x[at], self.y[at], self.from[at], self.level[at]) = (x as i32, y as i32, from, level);
+        self.count += 1;
+    }
+
+    /// Forgets the first ones.
+    fn forget(&mut self, count: usize) {
+        self.x.copy_within(count..self.count, 0);
+        self.y.copy_within(count..self.count, 0);
+        self.from.copy_within(count..self.count, 0);
+        self.level.copy_within(count..self.count, 0);
+        self.count -= count;
+    }
 }
 
 /// Sixteen beams: where they start and at which level, and between which bounds their directions lie.
@@ -84,9 +121,10 @@ impl<'a, const FOOTPRINT: bool> ViewRays<'a, FOOTPRINT> {
             below,
             pixels,
             tile: 0,
-            group: 0,
+            fine: 0,
             starts,
             levels,
+            left: Left::new(),
         }
     }
 
@@ -131,6 +169,100 @@ impl<'a, const FOOTPRINT: bool> ViewRays<'a, FOOTPRINT> {
                 self.levels[row * 16 + column] = fine.level[part as usize];
             }
         }
+    }
+
+    /// Directions through some pixels.
+    #[inline(always)]
+    fn directions<L: Lanes>(&self, l: L, x: L::I, y: L::I) -> [L::F; 3] {
+        let px = l.add(l.float(x), l.splat(self.sample.x));
+        let py = l.add(l.float(y), l.splat(self.sample.y));
+        let mut direction = [px; 3];
+        for (axis, direction) in direction.iter_mut().enumerate() {
+            let across = l.add(l.splat(self.corner[axis]), l.mul(l.splat(self.right[axis]), px));
+            *direction = l.add(across, l.mul(l.splat(self.down[axis]), py));
+        }
+        direction
+    }
+
+    /// How wide rays are at distance 1 (samples).
+    fn spread(&self, scene: &Scene) -> f32 {
+        if FOOTPRINT { self.pixels * self.right.length() * scene.per_metre.min_element() } else { 0.0 }
+    }
+
+    /// Walks the rays of the fine beam at (x, y) as far as they go together.
+    #[inline(always)]
+    fn walk<L: Lanes>(&mut self, l: L, scene: &Scene, (x, y): (u32, u32), from: f32, level: i32) {
+        let (mut directions, mut wanted) = ([[l.splat(0.0); 3]; 2], 0);
+        for (half, directions) in directions.iter_mut().enumerate().take(16 / L::COUNT) {
+            let at = half * L::COUNT;
+            let ix = l.iadd(l.load_int(&PIXEL_X[at..]), l.int(x as i32));
+            let iy = l.iadd(l.load_int(&PIXEL_Y[at..]), l.int(y as i32));
+            let inside = l.and(l.igt(l.int(self.width as i32), ix), l.igt(l.int(self.rows.end as i32), iy));
+            wanted |= l.bits(inside) << at;
+            *directions = self.directions(l, ix, iy);
+        }
+        let middle = Vec2::new(x as f32, y as f32) + 0.5 * FINE as f32;
+        let middle = self.corner + self.right * middle.x + self.down * middle.y;
+        let beam = Beam { eye: self.eye, directions: &directions, middle, from, wanted, spread: self.spread(scene) };
+        let mut outcome = Outcome { distance: [0.0; 16], from: [0.0; 16], open: 0, below: 0 };
+        tile::walk(l, scene, &beam, &mut outcome);
+        let columns = tile::SIDE.min((self.width - x) as usize);
+        for (row, distances) in outcome.distance.chunks_exact(tile::SIDE).enumerate() {
+            if y + (row as u32) < self.rows.end {
+                let line = self.place(x, y + row as u32);
+                self.distances[line..line + columns].copy_from_slice(&distances[..columns]);
+            }
+        }
+        for lane in ones(outcome.below & wanted) {
+            self.below.push(self.place(x + lane % FINE, y + lane / FINE) as i32);
+        }
+        // Those that have gone some way stand near the ground.
+        let level = if outcome.open == wanted && outcome.from[0] == from { level } else { 1 };
+        for lane in ones(outcome.open & wanted) {
+            self.left.push((x + lane % FINE, y + lane / FINE), outcome.from[lane as usize], level);
+        }
+    }
+
+    /// Prepares pixels for the stream.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "the numbers of a ray, each once")]
+    fn prepare<L: Lanes>(
+        &self,
+        l: L,
+        scene: &Scene,
+        block: &mut Prepared,
+        at: usize,
+        (x, y): (L::I, L::I),
+        from: L::F,
+        level: L::I,
+    ) {
+        let inside = l.and(l.igt(l.int(self.width as i32), x), l.igt(l.int(self.rows.end as i32), y));
+        let line = l.imul(l.isub(y, l.int(self.rows.start as i32)), l.int(self.width as i32));
+        let id = l.iselect(inside, l.iadd(line, x), l.int(NOWHERE));
+        let origin = [l.splat(self.eye.x), l.splat(self.eye.y), l.splat(self.eye.z)];
+        let direction = self.directions(l, x, y);
+        block.set(l, scene, at, id, origin, direction, l.splat(f32::INFINITY), from, level);
+        if FOOTPRINT {
+            l.store(l.splat(self.spread(scene)), &mut block.spread[at..]);
+        }
+    }
+
+    /// Moves up to sixteen of the rays that are left to the block.
+    #[inline(always)]
+    fn take<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
+        let count = self.left.count.min(16);
+        for part in (0..16).step_by(L::COUNT) {
+            let pixels = (l.load_int(&self.left.x[part..]), l.load_int(&self.left.y[part..]));
+            let (from, level) = (l.load(&self.left.from[part..]), l.load_int(&self.left.level[part..]));
+            self.prepare(l, scene, block, block.count + part, pixels, from, level);
+        }
+        block.count += count;
+        self.left.forget(count);
+    }
+
+    /// Where the answer of a pixel goes.
+    fn place(&self, x: u32, y: u32) -> usize {
+        (y - self.rows.start) as usize * self.width as usize + x as usize
     }
 
     /// Writes down that the pixels of the fine beam at (x, y) see nothing.
@@ -228,6 +360,15 @@ impl<'a, const FOOTPRINT: bool> ViewRays<'a, FOOTPRINT> {
     }
 }
 
+/// The numbers of the bits that are set.
+fn ones(mut bits: u32) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let bit = (bits != 0).then(|| bits.trailing_zeros());
+        bits &= bits.wrapping_sub(1);
+        bit
+    })
+}
+
 /// The first and last cell along an axis that a beam touches between distances `from` and `to`: `bounds` of its direction,
 /// `at` its origin.
 #[inline(always)]
@@ -254,55 +395,45 @@ impl<const FOOTPRINT: bool> Rays for ViewRays<'_, FOOTPRINT> {
     fn next<L: Lanes>(&mut self, l: L, scene: &Scene, block: &mut Prepared) {
         let across = self.width.div_ceil(TILE);
         let tiles = across * (self.rows.end - self.rows.start).div_ceil(TILE);
+        let cells = FINE as f32 * self.right.length() * scene.per_metre.max_element();
         block.count = 0;
-        while self.tile < tiles {
+        while block.count < BLOCK && self.tile < tiles {
             let (x, y) = (self.tile % across * TILE, self.rows.start + self.tile / across * TILE);
-            if self.group == 0 {
+            if self.fine == 0 {
                 self.survey(l, scene, x, y);
             }
-            let (gx, gy) = (self.group % 8 * 8, self.group / 8 * 8);
-            self.group += 1;
-            if self.group == 64 {
-                (self.group, self.tile) = (0, self.tile + 1);
+            // Two by two, so that those that meet in the stream are neighbours.
+            let (group, beam) = (self.fine / 4, self.fine % 4);
+            let (bx, by) = (group % 8 * 2 + beam % 2, group / 8 * 2 + beam / 2);
+            let fine = (by * (TILE / FINE) + bx) as usize;
+            self.fine += 1;
+            if self.fine as usize == FINE_IN_TILE {
+                (self.fine, self.tile) = (0, self.tile + 1);
             }
-            if x + gx >= self.width || y + gy >= self.rows.end {
+            let (x, y) = (x + bx * FINE, y + by * FINE);
+            let (start, level) = (self.starts[fine], self.levels[fine]);
+            if x >= self.width || y >= self.rows.end {
                 continue;
             }
-            let origin = [l.splat(self.eye.x), l.splat(self.eye.y), l.splat(self.eye.z)];
-            for beam in 0..4 {
-                let (bx, by) = (gx + beam % 2 * FINE, gy + beam / 2 * FINE);
-                let fine = (by / FINE * 16 + bx / FINE) as usize;
-                if self.starts[fine] == f32::INFINITY {
-                    self.nothing(x + bx, y + by);
-                    continue;
-                }
+            if start == f32::INFINITY {
+                self.nothing(x, y);
+            } else if start * cells > TOGETHER {
                 for part in (0..16).step_by(L::COUNT) {
-                    let ix = l.iadd(l.load_int(&PIXEL_X[part..]), l.int((x + bx) as i32));
-                    let iy = l.iadd(l.load_int(&PIXEL_Y[part..]), l.int((y + by) as i32));
-                    let inside = l.and(l.igt(l.int(self.width as i32), ix), l.igt(l.int(self.rows.end as i32), iy));
-                    let line = l.imul(l.isub(iy, l.int(self.rows.start as i32)), l.int(self.width as i32));
-                    let id = l.iselect(inside, l.iadd(line, ix), l.int(NOWHERE));
-                    let px = l.add(l.float(ix), l.splat(self.sample.x));
-                    let py = l.add(l.float(iy), l.splat(self.sample.y));
-                    let mut direction = [px; 3];
-                    for (axis, direction) in direction.iter_mut().enumerate() {
-                        let across = l.add(l.splat(self.corner[axis]), l.mul(l.splat(self.right[axis]), px));
-                        *direction = l.add(across, l.mul(l.splat(self.down[axis]), py));
-                    }
-                    let (from, level) = (l.splat(self.starts[fine]), l.int(self.levels[fine]));
+                    let ix = l.iadd(l.load_int(&PIXEL_X[part..]), l.int(x as i32));
+                    let iy = l.iadd(l.load_int(&PIXEL_Y[part..]), l.int(y as i32));
                     let at = block.count + part;
-                    block.set(l, scene, at, id, origin, direction, l.splat(f32::INFINITY), from, level);
-                    if FOOTPRINT {
-                        let spread = self.pixels * self.right.length() * scene.per_metre.min_element();
-                        l.store(l.splat(spread), &mut block.spread[at..]);
-                    }
+                    self.prepare(l, scene, block, at, (ix, iy), l.splat(start), l.int(level));
                 }
                 block.count += 16;
+            } else {
+                self.walk(l, scene, (x, y), start, level);
+                if self.left.count >= 16 {
+                    self.take(l, scene, block);
+                }
             }
-            if block.count == 0 {
-                continue;
-            }
-            return;
+        }
+        if block.count < BLOCK && self.left.count > 0 {
+            self.take(l, scene, block);
         }
     }
 

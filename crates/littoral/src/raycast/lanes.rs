@@ -32,9 +32,13 @@ pub(super) trait Lanes: Copy {
     fn le(self, a: Self::F, b: Self::F) -> Self::M;
     /// `a` where the mask is set, else `b`.
     fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F;
+    /// The least of the lanes, none of them NaN.
+    fn least(self, a: Self::F) -> f32;
     /// Exclusive or of the bits with those of an integer: flips signs.
     fn flip(self, a: Self::F, bits: Self::I) -> Self::F;
 
+    /// The bits of numbers as integers.
+    fn to_bits(self, a: Self::F) -> Self::I;
     fn float(self, a: Self::I) -> Self::F;
     /// The greatest integer that is not greater; numbers outside the range of `i32` give anything.
     fn floor(self, a: Self::F) -> Self::I;
@@ -133,7 +137,9 @@ impl Lanes for Portable {
     #[inline(always)] fn lt(self, a: Self::F, b: Self::F) -> Self::M { both(a, b, |a, b| a < b) }
     #[inline(always)] fn le(self, a: Self::F, b: Self::F) -> Self::M { both(a, b, |a, b| a <= b) }
     #[inline(always)] fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F { pick(mask, a, b) }
+    #[inline(always)] fn least(self, a: Self::F) -> f32 { a.into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a }) }
     #[inline(always)] fn flip(self, a: Self::F, bits: Self::I) -> Self::F { std::array::from_fn(|i| f32::from_bits(a[i].to_bits() ^ bits[i] as u32)) }
+    #[inline(always)] fn to_bits(self, a: Self::F) -> Self::I { each(a, |a| a.to_bits() as i32) }
     #[inline(always)] fn float(self, a: Self::I) -> Self::F { each(a, |a| a as f32) }
     #[inline(always)] fn floor(self, a: Self::F) -> Self::I { each(a, |a| { let i = a as i32; if i as f32 > a { i.wrapping_sub(1) } else { i } }) }
     #[inline(always)] fn iadd(self, a: Self::I, b: Self::I) -> Self::I { both(a, b, i32::wrapping_add) }
@@ -243,7 +249,15 @@ mod x86 {
         #[inline(always)] fn lt(self, a: Self::F, b: Self::F) -> Self::M { unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(a, b) } }
         #[inline(always)] fn le(self, a: Self::F, b: Self::F) -> Self::M { unsafe { _mm256_cmp_ps::<_CMP_LE_OQ>(a, b) } }
         #[inline(always)] fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm256_blendv_ps(b, a, mask) } }
+        #[inline(always)] fn least(self, a: Self::F) -> f32 {
+            unsafe {
+                let a = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
+                let a = _mm_min_ps(a, _mm_movehl_ps(a, a));
+                _mm_cvtss_f32(_mm_min_ss(a, _mm_movehdup_ps(a)))
+            }
+        }
         #[inline(always)] fn flip(self, a: Self::F, bits: Self::I) -> Self::F { unsafe { _mm256_xor_ps(a, _mm256_castsi256_ps(bits)) } }
+        #[inline(always)] fn to_bits(self, a: Self::F) -> Self::I { unsafe { _mm256_castps_si256(a) } }
         #[inline(always)] fn float(self, a: Self::I) -> Self::F { unsafe { _mm256_cvtepi32_ps(a) } }
         #[inline(always)] fn floor(self, a: Self::F) -> Self::I { unsafe { _mm256_cvttps_epi32(_mm256_floor_ps(a)) } }
         #[inline(always)] fn iadd(self, a: Self::I, b: Self::I) -> Self::I { unsafe { _mm256_add_epi32(a, b) } }
@@ -337,7 +351,9 @@ mod x86 {
         #[inline(always)] fn lt(self, a: Self::F, b: Self::F) -> Self::M { unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b) } }
         #[inline(always)] fn le(self, a: Self::F, b: Self::F) -> Self::M { unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) } }
         #[inline(always)] fn select(self, mask: Self::M, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm512_mask_blend_ps(mask, b, a) } }
+        #[inline(always)] fn least(self, a: Self::F) -> f32 { unsafe { _mm512_reduce_min_ps(a) } }
         #[inline(always)] fn flip(self, a: Self::F, bits: Self::I) -> Self::F { unsafe { _mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(a), bits)) } }
+        #[inline(always)] fn to_bits(self, a: Self::F) -> Self::I { unsafe { _mm512_castps_si512(a) } }
         #[inline(always)] fn float(self, a: Self::I) -> Self::F { unsafe { _mm512_cvtepi32_ps(a) } }
         #[inline(always)] fn floor(self, a: Self::F) -> Self::I { unsafe { _mm512_cvt_roundps_epi32::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(a) } }
         #[inline(always)] fn iadd(self, a: Self::I, b: Self::I) -> Self::I { unsafe { _mm512_add_epi32(a, b) } }

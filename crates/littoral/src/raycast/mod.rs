@@ -16,6 +16,7 @@ mod sight;
 mod single;
 mod slope;
 mod stream;
+mod tile;
 mod viewshed;
 mod walk;
 

@@ -259,6 +259,9 @@ impl Rings {
             for (row, raw) in raw.iter_mut().enumerate().take(count) {
                 let from = if frame.forward { first + row } else { first + count - 1 - row } * columns;
                 if whole {
+                    // What the next batch will read, as above.
+                    let ahead = if frame.forward { from + BATCH * columns } else { from.wrapping_sub(BATCH * columns) };
+                    V::prefetch(heights.as_ptr().wrapping_add(ahead.wrapping_add(lowest)));
                     raw.copy_from_slice(&heights[from + lowest..from + lowest + 16]);
                     if !frame.rising {
                         raw.reverse();
@@ -294,8 +297,11 @@ impl Rings {
                 relative = relative.sub(eye);
                 relative.store(to);
                 reach = reach.max(relative.abs());
-                let before = if lonely { relative.previous() } else { V::load(to.sub(1)) };
-                rough = rough.max(relative.sub(before).abs());
+                rough = rough.max(relative.sub(relative.previous()).abs());
+                if !lonely {
+                    // One number by itself: a vector across both blocks would wait for what was just written.
+                    rough = rough.max(V::splat((*to - *to.sub(1)).abs()));
+                }
             }
         }
         (self.reach, self.rough) = (reach.greatest(), rough.greatest());

@@ -59,6 +59,15 @@ pub(super) trait Lanes: Copy {
     }
     /// Asks for a cache line that will be read soon; any address will do.
     fn prefetch(_from: *const f32) {}
+    /// Runs what is seldom needed as a function of its own, with the instructions of this form: inlined it would take
+    /// registers from what is always needed.
+    ///
+    /// # Safety
+    /// The processor must have the instructions of this form.
+    #[inline(always)]
+    unsafe fn apart(work: impl FnOnce() -> u16) -> u16 {
+        work()
+    }
     /// One lane.
     fn lane(self, lane: usize) -> f32;
     /// The smallest lane.
@@ -225,6 +234,15 @@ mod x86 {
         fn prefetch(from: *const f32) {
             unsafe { _mm_prefetch::<_MM_HINT_T0>(from.cast()) }
         }
+        #[inline(always)]
+        unsafe fn apart(work: impl FnOnce() -> u16) -> u16 {
+            #[target_feature(enable = "avx512f,avx512dq,avx2,bmi1,bmi2,lzcnt,popcnt")]
+            #[inline(never)]
+            fn run(work: impl FnOnce() -> u16) -> u16 {
+                work()
+            }
+            unsafe { run(work) }
+        }
         type Index = __m512i;
 
         #[inline(always)]
@@ -358,6 +376,15 @@ mod x86 {
         #[inline(always)]
         fn prefetch(from: *const f32) {
             unsafe { _mm_prefetch::<_MM_HINT_T0>(from.cast()) }
+        }
+        #[inline(always)]
+        unsafe fn apart(work: impl FnOnce() -> u16) -> u16 {
+            #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+            #[inline(never)]
+            fn run(work: impl FnOnce() -> u16) -> u16 {
+                work()
+            }
+            unsafe { run(work) }
         }
         type Index = (__m256i, __m256i);
 

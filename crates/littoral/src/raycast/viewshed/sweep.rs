@@ -290,8 +290,23 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
             skipped = true;
             continue;
         }
+        // Bin by bin: what its rays pass over lies between the samples from one before its first to two after.
+        let width = width_of_bin * ring.distance;
+        let y = lane.mul(V::splat(width as f32)).add(V::splat(start));
+        let (index, whole) = y.whole();
+        let (f, n) = unsafe { (ring_of_samples::<V>(far), ring_of_samples::<V>(near)) };
+        let ahead = f[0].max(f[1]).max(f[2].max(f[3]));
+        let highest = ahead.max(n[0].max(n[1]).max(n[2].max(n[3]))).lookup(index);
+        let lower = lower_left.min(lower_right);
+        let level = lower.mul(V::splat(before)).min(lower.mul(V::splat(distance)));
+        if highest.add(V::splat(target_height.max(0.0) + 2.0 * rounding)).at_most(level) == u16::MAX {
+            skipped = true;
+            continue;
+        }
         if skipped {
-            last = V::splat(floor);
+            // All that was skipped lies below the lower bounds, which have not changed since, or below the floor.
+            let inside = lower.select(u16::MAX >> 1, V::splat(NOTHING));
+            last = inside.max(inside.previous()).max(V::splat(floor));
             after_crest = after_crest.max(last);
             (low_left, low_right) = (V::splat(NOTHING), V::splat(NOTHING));
             skipped = false;
@@ -303,14 +318,10 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
         let inverse = 1.0 / distance;
         let margin = V::splat(rounding * inverse);
         let (per_ring, inverse) = (V::splat(1.0 / before), V::splat(inverse));
-        let width = width_of_bin * ring.distance;
         let inverse_width = V::splat((1.0 / width) as f32);
 
         // The ground at the edges.
-        let y = lane.mul(V::splat(width as f32)).add(V::splat(start));
-        let (index, whole) = y.whole();
         let within = y.sub(whole);
-        let (f, n) = unsafe { (ring_of_samples::<V>(far), ring_of_samples::<V>(near)) };
         let (a, b) = (f[1].lookup(index), f[2].lookup(index));
         let step = b.sub(a);
         let slope = a.add(step.mul(within)).mul(inverse);
@@ -367,28 +378,35 @@ unsafe fn cross<V: Lanes, const VOIDS: bool>(
             let first = rings.rings[1].ring as f32;
             let crest = Crest { from: crest_from, to: crest_to, before: before_crest, after: after_crest, first };
             let doubt = Doubt { row, doubtful, index, whole, peak: b, step, sample, at, twist, crest };
+            let (past, ago, pending) = (&*past, &bins.ago, &mut *pending);
             // SAFETY: the caller vouches for the instructions.
             visible |= unsafe {
-                resolve::<V, VOIDS>(
-                    rings,
-                    past,
-                    &bins.ago,
-                    doubt,
-                    target_height,
-                    left as f32,
-                    |lanes, open_from, open_to| {
-                        let mut lanes = lanes;
-                        while lanes != 0 {
-                            let lane = lanes.trailing_zeros();
-                            let place = (has & ((1 << lane) - 1)).count_ones();
-                            if asked >> place & 1 == 1 {
-                                let minor = base + i64::from(place);
-                                let (from, to) =
-                                    (open_from.lane(lane as usize) as i64, open_to.lane(lane as usize) as i64);
-                                pending.push(Pending { ring: ring.ring, minor, from, to });
-                            }
-                            lanes &= lanes - 1;
-                        }
+                V::apart(
+                    #[inline(always)]
+                    move || {
+                        resolve::<V, VOIDS>(
+                            rings,
+                            past,
+                            ago,
+                            doubt,
+                            target_height,
+                            left as f32,
+                            #[inline(always)]
+                            |lanes, open_from, open_to| {
+                                let mut lanes = lanes;
+                                while lanes != 0 {
+                                    let lane = lanes.trailing_zeros();
+                                    let place = (has & ((1 << lane) - 1)).count_ones();
+                                    if asked >> place & 1 == 1 {
+                                        let minor = base + i64::from(place);
+                                        let (from, to) =
+                                            (open_from.lane(lane as usize) as i64, open_to.lane(lane as usize) as i64);
+                                        pending.push(Pending { ring: ring.ring, minor, from, to });
+                                    }
+                                    lanes &= lanes - 1;
+                                }
+                            },
+                        )
                     },
                 )
             };

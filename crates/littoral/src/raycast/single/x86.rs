@@ -1,0 +1,216 @@
+//! The looks of `single.rs` with AVX-512.
+
+use super::*;
+use std::arch::x86_64::*;
+
+/// Sixteen lanes of AVX-512 F, BW, DQ and VL.
+#[derive(Clone, Copy)]
+struct Avx512(());
+
+/// The kernel compiled for AVX-512.
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,popcnt,lzcnt")]
+pub(super) fn first_hit(land: &Single, ray: &LocalRay) -> f32 {
+    land.walk(Avx512(()), ray)
+}
+
+const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
+const UP: i32 = _MM_FROUND_TO_POS_INF | _MM_FROUND_NO_EXC;
+
+// Functions rather than closures: a closure is compiled by itself, without the features of the function around it.
+
+/// The same place, which the compiler no longer recognizes: what is there is read where it is needed, by the instruction
+/// that needs it, not ahead of the loop into a register that then has to be saved.
+#[inline(always)]
+#[allow(clippy::pointers_in_nomem_asm_block, reason = "no instruction is there to read or write")]
+fn anew<T>(place: &T) -> &T {
+    let mut pointer: *const T = place;
+    // SAFETY: no instruction at all; the pointer stays what it is.
+    unsafe {
+        std::arch::asm!("/* {0} */", inout(reg) pointer, options(nomem, nostack, preserves_flags));
+        &*pointer
+    }
+}
+
+/// Eight numbers of a table of 32.
+#[inline(always)]
+fn pick((a, b): (__m512, __m512), index: __m256i) -> __m256 {
+    unsafe { _mm512_castps512_ps256(_mm512_permutex2var_ps(a, _mm512_castsi256_si512(index), b)) }
+}
+
+/// Height of the ray over bilinear patches at s.
+#[inline(always)]
+fn over<const X: bool>(
+    way: &Way,
+    (rise, across, twist): (__m256, __m256, __m256),
+    [column, beside, height]: [__m256; 3],
+    s: __m256,
+) -> __m256 {
+    unsafe {
+        let u = _mm256_sub_ps(s, column);
+        let v = _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(way.row::<X>().1), s), beside);
+        let side = _mm256_mul_ps(v, _mm256_add_ps(_mm256_mul_ps(twist, u), across));
+        let ground = _mm256_add_ps(_mm256_mul_ps(u, rise), side);
+        let z = _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(way.rate.z), s), height);
+        _mm256_sub_ps(z, ground)
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn at_the_border<const X: bool>(
+    land: &Single,
+    octant: &Octant,
+    way: &Way,
+    first: &f32,
+    row: i32,
+    x: usize,
+    y: usize,
+) -> Option<Met> {
+    Portable.patches::<X>(land, octant, way, first, row, x, y)
+}
+
+impl Looks for Avx512 {
+    #[inline(always)]
+    unsafe fn nodes<const X: bool>(
+        self,
+        octant: &Octant,
+        way: &Way,
+        floor: &Floor,
+        first: &f32,
+        block: &Block,
+        frame: *mut Frame,
+    ) -> u32 {
+        let way = anew(way);
+        let (row_at, slope) = way.row::<X>();
+        let (highs, tables) = (&block.0, anew(octant.tables));
+        unsafe {
+            // SAFETY: sixteen and sixty-four numbers, as many as are loaded and stored; the frame is the caller's.
+            let columns = _mm512_load_ps(floor.columns.0.as_ptr());
+            let table = _mm512_load_si512(tables.nodes.0.as_ptr().cast());
+            let (south, north) =
+                (_mm512_load_si512(highs.as_ptr().cast()), _mm512_load_si512(highs[32..].as_ptr().cast()));
+            let column = _mm512_add_ps(columns, _mm512_set1_ps(*anew(first)));
+            _mm512_store_ps((*frame).columns.0.as_mut_ptr(), column);
+            let enter = _mm512_max_ps(column, _mm512_set1_ps(way.from));
+            let next = _mm512_add_ps(column, _mm512_set1_ps(floor.side));
+            let leave = _mm512_min_ps(next, _mm512_set1_ps(way.end));
+            let edge = _mm512_mask_blend_ps(0xAAAA, enter, leave);
+            let row = _mm512_add_ps(_mm512_mul_ps(_mm512_set1_ps(slope), edge), _mm512_set1_ps(row_at));
+            let row = _mm512_cvt_roundps_epi32::<DOWN>(row);
+            let row = _mm512_sra_epi32(row, _mm_load_si128((&raw const floor.shift).cast()));
+            _mm512_store_si512((*frame).rows.0.as_mut_ptr().cast(), row);
+            let row = _mm512_sub_epi32(row, _mm512_set1_epi32(anew(&*frame).node[1]));
+            let lowest = _mm512_mask_blend_ps(octant.falls, enter, leave);
+            let lowest =
+                _mm512_add_ps(_mm512_mul_ps(_mm512_set1_ps(way.steps_rate.z), lowest), _mm512_set1_ps(way.steps.z));
+            let lowest = _mm512_max_ps(_mm512_set1_ps(tables.one), lowest);
+            let lowest = _mm512_cvt_roundps_epi32::<UP>(lowest);
+            let index = _mm512_xor_si512(table, if X { _mm512_slli_epi32::<3>(row) } else { row });
+            let high = _mm512_permutex2var_epi16(south, index, north);
+            let high = _mm512_and_si512(high, _mm512_set1_epi32(tables.word));
+            let inside = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(enter, leave);
+            let inside = _mm512_mask_cmplt_epu32_mask(inside, row, _mm512_set1_epi32(tables.eight));
+            let twin = _mm512_cmpeq_epi32_mask(row, _mm512_shuffle_epi32::<0b10_11_00_01>(row));
+            let blocked = _mm512_mask_cmple_epu32_mask(inside, lowest, high);
+            u32::from(blocked) & !(u32::from(twin) & 0xAAAA)
+        }
+    }
+
+    #[inline(always)]
+    fn patches<const X: bool>(
+        self,
+        land: &Single,
+        octant: &Octant,
+        way: &Way,
+        first: &f32,
+        row: i32,
+        x: usize,
+        y: usize,
+    ) -> Option<Met> {
+        // At the map's north and east the samples of fewer patches must do.
+        if x >= land.whole[0] || y >= land.whole[1] {
+            return at_the_border::<X>(land, octant, &{ *way }, first, row, x, y);
+        }
+        let corner = 4 * (y * land.columns + x);
+        let way = anew(way);
+        let (land, octant) = (anew(land), anew(octant));
+        let (row_at, slope) = way.row::<X>();
+        unsafe {
+            let tables = anew(octant.tables);
+            let columns = _mm256_load_ps(tables.columns.0.as_ptr());
+            let odd = _mm256_load_ps(tables.rows.0.as_ptr());
+            let (zero, one) = (_mm256_setzero_ps(), _mm256_set1_ps(tables.one));
+            let column = _mm256_add_ps(columns, _mm256_set1_ps(*anew(first)));
+            let enter = _mm256_max_ps(column, _mm256_set1_ps(way.start));
+            let leave = _mm256_min_ps(_mm256_add_ps(column, one), _mm256_set1_ps(way.end));
+            let base = _mm256_set1_ps(row_at - (4 * row) as f32);
+            let row = _mm256_floor_ps(_mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(slope), enter), base));
+            let crossing = _mm256_sub_ps(_mm256_add_ps(row, one), base);
+            let crossing = _mm256_mul_ps(crossing, _mm256_set1_ps(way.inverse_slope::<X>()));
+            let a = _mm256_blend_ps::<0xAA>(enter, _mm256_max_ps(crossing, enter));
+            let b = _mm256_blend_ps::<0x55>(leave, _mm256_min_ps(crossing, leave));
+            let row = _mm256_add_ps(row, odd);
+            let minor = _mm256_cvttps_epi32(row);
+            let valid = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
+            let valid = _mm256_mask_cmplt_epu32_mask(valid, minor, _mm256_set1_epi32(tables.four));
+
+            // SAFETY: five rows of eight samples, of which five are looked at; nodes that are whole have as many, and where rows
+            // are mirrored they are the same ones from the other end.
+            let first = land.heights.as_ptr().add(corner).offset(octant.start);
+            let two = |index: isize| {
+                let (a, b) = (first.offset(index * octant.line), first.offset((index + 1) * octant.line));
+                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm256_loadu_ps(a)), _mm256_loadu_ps(b))
+            };
+            let (near, far) = ((two(0), two(2)), (two(1), two(3)));
+            let tables = &tables.samples;
+            let minor = if X {
+                _mm256_slli_epi32::<3>(minor)
+            } else {
+                _mm256_xor_si256(minor, _mm256_set1_epi32(octant.mirror[1] & 3))
+            };
+            let this = _mm256_add_epi32(minor, _mm256_load_si256(tables[0].0.as_ptr().cast()));
+            let that = _mm256_add_epi32(minor, _mm256_load_si256(tables[1].0.as_ptr().cast()));
+            let (corner, beside, beyond, last) = (pick(near, this), pick(near, that), pick(far, this), pick(far, that));
+            let (next, aside) = if X { (beside, beyond) } else { (beyond, beside) };
+            let (rise, across) = (_mm256_sub_ps(next, corner), _mm256_sub_ps(aside, corner));
+            let twist = _mm256_sub_ps(_mm256_sub_ps(last, aside), rise);
+
+            let height = _mm256_sub_ps(_mm256_set1_ps(way.at.z), corner);
+            let surface = (rise, across, twist);
+            let lines = [column, _mm256_sub_ps(base, row), height];
+            let (f0, f1) = (over::<X>(way, surface, lines, a), over::<X>(way, surface, lines, b));
+            let length = _mm256_sub_ps(b, a);
+            let bend = _mm256_mul_ps(_mm256_mul_ps(twist, _mm256_set1_ps(slope)), _mm256_mul_ps(length, length));
+            let bend = _mm256_sub_ps(zero, bend);
+            let near = _mm256_max_ps(zero, bend);
+            let near = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, f0, near)
+                | _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, f1, near);
+            if near == 0 {
+                return None;
+            }
+            let slope = _mm256_sub_ps(_mm256_sub_ps(f1, f0), bend);
+            let disc = _mm256_mul_ps(_mm256_mul_ps(_mm256_set1_ps(4.0), bend), f0);
+            let disc = _mm256_sub_ps(_mm256_mul_ps(slope, slope), disc);
+            let falls = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(slope, zero);
+            let dips = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(falls, zero, disc);
+            let turns = _mm256_add_ps(slope, _mm256_add_ps(bend, bend));
+            let dips = _mm256_mask_cmp_ps_mask::<_CMP_LT_OQ>(dips, zero, turns);
+            let under = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(f0, zero) | _mm256_cmp_ps_mask::<_CMP_LE_OQ>(f1, zero);
+            let hit = near & (under | dips);
+            if hit == 0 {
+                return None;
+            }
+            let root = _mm256_sqrt_ps(_mm256_max_ps(disc, zero));
+            let above = _mm256_mask_blend_ps(falls, _mm256_add_ps(slope, root), _mm256_add_ps(f0, f0));
+            let under = _mm256_mul_ps(_mm256_set1_ps(-2.0), bend);
+            let under = _mm256_mask_blend_ps(falls, under, _mm256_sub_ps(root, slope));
+            let root = _mm256_min_ps(_mm256_div_ps(above, under), one);
+            let root = _mm256_maskz_mov_ps(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(zero, f0), root);
+            let s = _mm256_add_ps(_mm256_mul_ps(root, length), a);
+            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(f0, zero);
+            let first = hit & hit.wrapping_neg();
+            let s = _mm256_cvtss_f32(_mm256_maskz_compress_ps(first, s));
+            Some(Met { s, below: below & first != 0 })
+        }
+    }
+}
