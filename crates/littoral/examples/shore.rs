@@ -63,13 +63,13 @@ fn main() -> Result<(), Failure> {
             sea.add_motion(&points, &mut motion);
             let mut levels = [0.0; BLOCK];
             sea.waterline(&points, &mut levels);
-            for l in 0..BLOCK {
+            for (l, swashed) in levels.into_iter().enumerate() {
                 let column = block * BLOCK as u32 + l as u32;
                 if column >= width {
                     break;
                 }
                 let (ground_height, ground_slope) = ground.at(DVec2::new(points.x[l], points.y[l]));
-                let level = swash * levels[l];
+                let level = swash * swashed;
                 let colour = if ground_height > level.max(motion.dz[l].max(0.0) * swash) && ground_height > -0.3 {
                     land(ground_height, ground_slope)
                 } else {
@@ -115,11 +115,11 @@ fn land(height: f32, slope: Vec2) -> [f32; 3] {
 }
 
 fn water(depth: f32, slope: Vec2, foam: f32) -> [f32; 3] {
-    // The bed through the water, its colour and the sky on it, by which way a facet leans.
+    // The bed through the water, its colour and the sky on it, by which way a facet leans: a low light in the north-west.
     let left = [0.45f32, 0.11, 0.08].map(|a| (-a * 2.0 * depth).exp());
     let sand = [0.46, 0.38, 0.26];
     let deep = [0.010, 0.055, 0.085];
-    let lean = 2.6 * slope.dot(Vec2::new(-0.8, 0.6));
+    let lean = 4.5 * slope.dot(Vec2::new(0.35, -0.94));
     let sky = (0.16 + 0.3 * lean).clamp(0.0, 0.9);
     let mut colour = [0.0; 3];
     for n in 0..3 {
@@ -134,7 +134,9 @@ fn water(depth: f32, slope: Vec2, foam: f32) -> [f32; 3] {
 fn flood(ground: &Ground) -> Vec<bool> {
     let (columns, rows) = (ground.columns, ground.rows);
     let mut wet = vec![false; columns * rows];
-    let edge = |i: usize| i % columns == 0 || i % columns == columns - 1 || i / columns == 0 || i / columns == rows - 1;
+    let edge = |i: usize| {
+        i.is_multiple_of(columns) || i % columns == columns - 1 || i / columns == 0 || i / columns == rows - 1
+    };
     let mut open: Vec<usize> = (0..columns * rows).filter(|&i| edge(i) && ground.heights[i] < 0.0).collect();
     open.iter().for_each(|&i| wet[i] = true);
     while let Some(i) = open.pop() {

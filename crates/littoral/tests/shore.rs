@@ -412,6 +412,9 @@ fn slopes_are_derivatives_and_nothing_exceeds_the_bounds() {
     }
     println!("derivatives off by at most {worst:?}");
     assert!(worst.iter().all(|w| *w < 4e-3), "{worst:?}");
+    let steep =
+        ShoreSea::new(&bed, &"beaufort=7,from=190,depth=14".parse().expect("a state"), 32).expect("a sea").bounds();
+    assert!(steep.stretch < 1.0, "{steep:?}");
     assert!(sea.roughness(0.0) == 0.0 && sea.roughness(3.0) <= sea.roughness(60.0));
     assert!(sea.roughness(1e9) >= 0.99 * bounds.height / 1.4);
 }

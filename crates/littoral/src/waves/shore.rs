@@ -9,14 +9,26 @@
 //! Near the shore waves are no sines: their sum takes the shape of T. Abreu et al. 2010, crests sharp, troughs flat, fronts steep,
 //! by as much as B. Ruessink, G. Ramaekers and L. van Rijn 2012 measured for the Ursell number of the place (see `shape`).
 //!
-//! What is approximate: waves run forward only (none comes back from a cliff), and each within some 70° of the side of the grid nearest to its
-//! heading; waves shorter than some three nodes shorten no further; currents and the wind over the shoal are not there.
+//! *How right it is* (`tests/shore.rs`). On a plane beach Snell's and Green's laws hold within 0.1 %, the flux of energy over shoals within 1.2 %.
+//! Behind a half-plane the amplitude is that of A. Sommerfeld's soft screen to 0.03 (rms; 0.08 at worst) of the incoming one within 45° of the
+//! shadow's edge. Round an island phases are within 1 % (rms) of those of a fine solution in time, everywhere but deep in the lee. Phases are kept
+//! to 5·10⁻⁵ rad and amplitudes to 6·10⁻⁵ of the incoming ones; linear interpolation of phases errs by an eighth of what the step of the relative
+//! phase from node to node changes by: 10⁻³ rad in 2 m of water on a slope of 1 : 30 with nodes 2 m apart. Slopes are the exact derivative
+//! of that surface, which has a kink of the same order at the borders of cells.
+//!
+//! *What is approximate.* Waves run forward only (none comes back from a cliff). Each marches along the side of the grid nearest to its
+//! heading, at most 45° off, about its own direction by Snell's law; what turns further than some 75° from that side is lost. Waves shorten to no
+//! less than what a grid resolves: their wave number grows by at most 2.4 per node. Currents and the wind over the shoal are not there.
 
 mod bed;
 mod lanes;
+#[allow(clippy::needless_range_loop, reason = "lanes are counted over several arrays at once")]
 mod march;
+#[allow(clippy::needless_range_loop, reason = "lanes are counted over several arrays at once")]
 mod measure;
+#[allow(clippy::needless_range_loop, reason = "lanes are counted over several arrays at once")]
 mod query;
+#[allow(clippy::needless_range_loop, reason = "lanes are counted over several arrays at once")]
 mod shape;
 mod solve;
 
@@ -140,12 +152,13 @@ pub struct ShoreSea {
     lace: shape::Lace,
     time: f64,
     bounds: Bounds,
-    /// Largest amplitude (m) of each component by the binary logarithm of its local wavelength, 8 bins from 1 m up.
+    /// Largest amplitude (m) of each component by octaves of its local wavelength.
     by_length: Vec<[f32; BINS]>,
     /// Scratch: sums of slopes by cell.
     steepness: Vec<f32>,
     scratch: Scratch,
-    sources: Vec<u32>,
+    /// Scratch: how many rings inland a node lies.
+    rings: Vec<u32>,
 }
 
 /// Bins of wavelengths, each an octave; the first is all below 1 m.
@@ -221,7 +234,7 @@ impl ShoreSea {
             by_length: Vec::new(),
             steepness: Vec::new(),
             scratch: Scratch::default(),
-            sources: Vec::new(),
+            rings: Vec::new(),
         };
         sea.solve(bed, waves, depth, settings, progress)?;
         Ok(sea)
@@ -333,64 +346,73 @@ impl ShoreSea {
         measure::measure(self);
     }
 
-    /// Lets the waves at the water's edge hold on into the land, for what is between nodes and for the swash.
+    /// Lets the waves at the water's edge hold on into the land, for what is between nodes and for the swash: ring by ring, every node of
+    /// land takes the mean of those around it that have some.
     fn reach_inland(&mut self) {
         const REACH: f64 = 80.0;
-        let grid = &self.scratch.grid;
-        let (columns, rows) = (self.columns, self.rows);
-        let rings = (REACH / self.spacing.min_element()).ceil().clamp(2.0, 40.0) as usize;
         const NONE: u32 = u32::MAX;
-        let sources = &mut self.sources;
-        sources.clear();
-        sources.extend((0..columns * rows).map(|i| if grid.near[i] > 1.0 { NONE } else { i as u32 }));
-        let spacing = self.spacing;
-        let away = |i: usize, source: u32| {
-            let s = source as usize;
-            let x = ((i % columns) as f64 - (s % columns) as f64) * spacing.x;
-            let y = ((i / columns) as f64 - (s / columns) as f64) * spacing.y;
-            x * x + y * y
-        };
-        let mut front: Vec<u32> = (0..columns * rows).filter(|&i| sources[i] == NONE).map(|i| i as u32).collect();
-        for _ in 0..rings {
-            // Found ring by ring, so that the order within one does not matter.
-            let found: Vec<(u32, u32)> = front
-                .iter()
-                .filter_map(|&i| {
-                    let i = i as usize;
-                    let (c, r) = (i % columns, i / columns);
-                    let mut best = NONE;
-                    for (dc, dr) in [(-1i32, 0i32), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)] {
-                        let (nc, nr) = (c.wrapping_add_signed(dc as isize), r.wrapping_add_signed(dr as isize));
-                        if nc >= columns || nr >= rows {
-                            continue;
-                        }
-                        let source = sources[nr * columns + nc];
-                        if source != NONE && (best == NONE || away(i, source) < away(i, best)) {
-                            best = source;
+        let (columns, rows, blocks) = (self.columns, self.rows, self.blocks);
+        let last = (REACH / self.spacing.min_element()).ceil().clamp(2.0, 40.0) as u32;
+        let fade = libm::exp(-self.spacing.min_element() / (0.4 * REACH)) as f32;
+        let near = &self.scratch.grid.near;
+        let rings = &mut self.rings;
+        rings.clear();
+        rings.extend(near.iter().map(|near| if *near > 1.0 { NONE } else { 0 }));
+        let mut dry: Vec<usize> = (0..columns * rows).filter(|&i| rings[i] == NONE).collect();
+        let mut around = Vec::with_capacity(8);
+        for ring in 1..=last {
+            let reached = |rings: &[u32], i: usize, around: &mut Vec<usize>| {
+                let (c, r) = (i % columns, i / columns);
+                around.clear();
+                for row in r.saturating_sub(1)..(r + 2).min(rows) {
+                    for column in c.saturating_sub(1)..(c + 2).min(columns) {
+                        if rings[row * columns + column] < ring {
+                            around.push(row * columns + column);
                         }
                     }
-                    (best != NONE).then_some((i as u32, best))
-                })
-                .collect();
-            if found.is_empty() {
+                }
+            };
+            dry.retain(|&i| {
+                reached(rings, i, &mut around);
+                if around.is_empty() {
+                    return true;
+                }
+                let count = around.len() as i32;
+                for block in 0..blocks {
+                    let first = self.records[around[0] * blocks + block];
+                    let mut mean = first;
+                    for l in 0..LANES {
+                        let (mut turn, mut amplitude) = (0i32, 0i32);
+                        for &n in &around {
+                            let record = &self.records[n * blocks + block];
+                            turn += i32::from(record.phase[l].wrapping_sub(first.phase[l]));
+                            amplitude += i32::from(record.amplitude[l]);
+                        }
+                        mean.phase[l] = first.phase[l].wrapping_add((turn / count) as i16);
+                        mean.amplitude[l] = (amplitude / count) as u16;
+                    }
+                    self.records[i * blocks + block] = mean;
+                }
+                let mut place = Place::default();
+                for &n in &around {
+                    place.0.iter_mut().zip(self.places[n].0).for_each(|(sum, value)| *sum += value / count as f32);
+                }
+                // Rollers do not climb the beach, and what swash may reach ends somewhere.
+                place.0[Place::BROKEN] *= 0.7;
+                place.0[Place::SETUP] *= fade;
+                place.0[Place::SWING] *= fade;
+                self.places[i] = place;
+                rings[i] = ring;
+                false
+            });
+            if dry.is_empty() {
                 break;
             }
-            found.iter().for_each(|&(i, source)| sources[i as usize] = source);
-            front.retain(|&i| sources[i as usize] == NONE);
-        }
-        let blocks = self.blocks;
-        for i in 0..columns * rows {
-            let source = self.sources[i];
-            if source == NONE || source as usize == i {
-                continue;
-            }
-            let source = source as usize;
-            self.records.copy_within(source * blocks..(source + 1) * blocks, i * blocks);
-            self.places[i] = self.places[source];
         }
     }
 
     /// Where on the grid a place lies: column and row of the node below it (which may lie off the grid), and how far on to the next.
+    #[allow(clippy::manual_clamp, reason = "what is no number becomes 0")]
     fn locate(&self, x: f64, y: f64) -> ([i64; 2], [f32; 2]) {
         let (u, v) = ((x - self.origin.x) * self.over.x, (y - self.origin.y) * self.over.y);
         let (c, r) = (u.floor(), v.floor());
@@ -492,7 +514,7 @@ impl WaveModel for ShoreSea {
         if wavelength.is_nan() || wavelength <= 0.0 {
             return 0.0;
         }
-        let bins = (wavelength.log2().ceil().max(0.0) as usize + 1).min(BINS);
+        let bins = measure::octave(wavelength) + 1;
         let sum: f32 = self.by_length.iter().map(|bins_of| bins_of[..bins].iter().copied().fold(0.0, f32::max)).sum();
         // Below the lowest bin with the length itself.
         let left = if wavelength < 1.0 { wavelength } else { 1.0 };

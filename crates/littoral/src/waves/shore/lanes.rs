@@ -54,7 +54,7 @@ fn quarter_sine(t: f32) -> f32 {
     let x = 4.0 * t;
     let y = x * x;
     let p = y.mul_add(-0.004_362_476, 0.079_487_66);
-    let p = y.mul_add(p, -0.645_920_98);
+    let p = y.mul_add(p, -0.645_921);
     x * y.mul_add(p, 1.570_794_9)
 }
 

@@ -77,32 +77,39 @@ fn tame(sea: &mut ShoreSea, steepness: &[f32]) {
         let most = 0.04 / height.max(0.04);
         (most * sea.spacing.x as f32, most * sea.spacing.y as f32)
     };
-    let open = sea.open.0[n];
     let edge = |c: usize, r: usize| c == 0 || r == 0 || c == columns - 1 || r == rows - 1;
-    for backward in [false, true] {
-        for step in 0..columns * rows {
-            let i = if backward { columns * rows - 1 - step } else { step };
-            let (c, r) = (i % columns, i / columns);
-            let mut most = sea.places[i].0[n];
-            if edge(c, r) {
-                most = most.min(open);
+    // The second time from the rim, where it is made the open sea's all round.
+    for _ in 0..2 {
+        let lowest = |open: f32, i: usize| {
+            if edge(i % columns, i / columns) { open.min(sea.places[i].0[n]) } else { open }
+        };
+        let open = (0..columns * rows).fold(sea.open.0[n], lowest);
+        sea.open.0[n] = open;
+        for backward in [false, true] {
+            for step in 0..columns * rows {
+                let i = if backward { columns * rows - 1 - step } else { step };
+                let (c, r) = (i % columns, i / columns);
+                let mut most = sea.places[i].0[n];
+                if edge(c, r) {
+                    most = most.min(open);
+                }
+                if backward {
+                    if c + 1 < columns {
+                        most = most.min(sea.places[i + 1].0[n] + slow_x);
+                    }
+                    if r + 1 < rows {
+                        most = most.min(sea.places[i + columns].0[n] + slow_y);
+                    }
+                } else {
+                    if c > 0 {
+                        most = most.min(sea.places[i - 1].0[n] + slow_x);
+                    }
+                    if r > 0 {
+                        most = most.min(sea.places[i - columns].0[n] + slow_y);
+                    }
+                }
+                sea.places[i].0[n] = most;
             }
-            if backward {
-                if c + 1 < columns {
-                    most = most.min(sea.places[i + 1].0[n] + slow_x);
-                }
-                if r + 1 < rows {
-                    most = most.min(sea.places[i + columns].0[n] + slow_y);
-                }
-            } else {
-                if c > 0 {
-                    most = most.min(sea.places[i - 1].0[n] + slow_x);
-                }
-                if r > 0 {
-                    most = most.min(sea.places[i - columns].0[n] + slow_y);
-                }
-            }
-            sea.places[i].0[n] = most;
         }
     }
 }
@@ -216,7 +223,7 @@ fn cell(sea: &ShoreSea, corners: [Option<usize>; 4], [height, slope, curvature]:
 }
 
 /// The bin of a wavelength (m).
-fn octave(wavelength: f32) -> usize {
+pub(super) fn octave(wavelength: f32) -> usize {
     // The exponent of a float is the integral part of its binary logarithm.
     let exponent = ((wavelength.to_bits() >> 23) & 0xFF) as i32 - 127;
     (exponent + 1).clamp(0, BINS as i32 - 1) as usize

@@ -38,6 +38,7 @@ struct Spots {
 }
 
 #[inline(always)]
+#[allow(clippy::manual_clamp, reason = "what is no number becomes a number")]
 fn find(sea: &ShoreSea, points: &Points) -> Spots {
     let mut spots =
         Spots { column: [0; BLOCK], row: [0; BLOCK], u: [0.0; BLOCK], v: [0.0; BLOCK], nodes: [[0; BLOCK]; 4] };
@@ -131,27 +132,24 @@ fn unpack(sea: &ShoreSea, spots: &Spots, point: usize, block: usize, cell: &mut 
     *cell = to;
 }
 
-/// Sums by point over every fourth wave, before these are added up: ζ, ξ, sideways x and y; then, of ζ and ξ, the derivatives along x and y;
-/// the three of the sideways motion; and three of hidden slopes.
-type Quarters<const N: usize> = [[[f32; 4]; BLOCK]; N];
-
-/// Sums over the waves at the points; the first `N` of those that [`Quarters`] names.
+/// Sums over the waves at the points, the first `N` of: ζ, ξ, sideways x and y; of ζ and ξ, the derivatives along x and y; the three of the
+/// sideways motion; and three of hidden slopes.
 #[inline(always)]
 fn gather<const N: usize>(sea: &ShoreSea, points: &Points, sums: &mut Sums) {
     let motion = N >= 11;
     let filtered = N == FILTERED_DISPLACEMENT || N == 14;
     let mut cells = [Cell::NONE; MOST];
     let mut ground = [[0.0f32; 8]; 4];
-    let (mut placed, mut placed_x, mut placed_y) = ([[0.0f32; 8]; BLOCK], [[0.0f32; 8]; BLOCK], [[0.0f32; 8]; BLOCK]);
     let mut unpacked = None;
     let (over_x, over_y) = (sea.over.x as f32, sea.over.y as f32);
     let tau = std::f32::consts::TAU;
     let spots = find(sea, points);
     fetch(sea, &spots);
-    let mut quarters: Quarters<N> = [[[0.0; 4]; BLOCK]; N];
+    let mut totals = [[0.0f32; BLOCK]; N];
     for point in 0..BLOCK {
         let (u, v) = (spots.u[point], spots.v[point]);
         let uv = u * v;
+        let mut quarters = [[0.0f32; 4]; N];
         let mut first = 0;
         while first < sea.blocks {
             let count = (sea.blocks - first).min(MOST);
@@ -208,58 +206,52 @@ fn gather<const N: usize>(sea: &ShoreSea, points: &Points, sums: &mut Sums) {
                     }
                 }
             }
-            for n in 0..N {
-                let mut half = [0.0f32; 8];
-                for l in 0..8 {
-                    half[l] = sum[n][l] + sum[n][l + 8];
-                }
-                for l in 0..4 {
-                    quarters[n][point][l] += half[l] + half[l + 4];
-                }
+            // Written out: in a loop over n the compiler would gather across the sums instead of adding within them.
+            macro_rules! fold {
+                ($($n:literal)*) => { $(if $n < N { fold(&sum[$n % N], &mut quarters[$n % N]); })* };
             }
+            fold!(0 1 2 3 4 5 6 7 8 9 10 11 12 13);
             first += count;
         }
+        for (total, q) in totals.iter_mut().zip(&quarters) {
+            total[point] = (q[0] + q[2]) + (q[1] + q[3]);
+        }
+        let (mut value, mut along_x, mut along_y) = ([0.0f32; 8], [0.0f32; 8], [0.0f32; 8]);
         for n in 0..8 {
             let [a, across, up, twist] = [ground[0][n], ground[1][n], ground[2][n], ground[3][n]];
-            placed[point][n] = uv.mul_add(twist, v.mul_add(up, u.mul_add(across, a)));
-            if motion {
-                placed_x[point][n] = v.mul_add(twist, across) * over_x;
-                placed_y[point][n] = u.mul_add(twist, up) * over_y;
-            }
+            value[n] = uv.mul_add(twist, v.mul_add(up, u.mul_add(across, a)));
+            along_x[n] = v.mul_add(twist, across) * over_x;
+            along_y[n] = u.mul_add(twist, up) * over_y;
         }
-    }
-    for l in 0..BLOCK {
         for n in 0..8 {
-            sums.place[n][l] = placed[l][n];
-            if motion {
-                sums.place_x[n][l] = placed_x[l][n];
-                sums.place_y[n][l] = placed_y[l][n];
+            sums.place[n][point] = value[n];
+        }
+        if motion {
+            for n in Place::HEIGHT..=Place::SIDEWAYS {
+                sums.place_x[n][point] = along_x[n];
+                sums.place_y[n][point] = along_y[n];
             }
         }
     }
-    for l in 0..BLOCK {
-        let whole = |n: usize| {
-            let q = quarters[n][l];
-            (q[0] + q[2]) + (q[1] + q[3])
-        };
-        sums.zeta[l] = whole(0);
-        sums.xi[l] = whole(1);
-        sums.side_x[l] = whole(2);
-        sums.side_y[l] = whole(3);
-        if N >= 11 {
-            sums.zeta_x[l] = whole(4);
-            sums.zeta_y[l] = whole(5);
-            sums.xi_x[l] = whole(6);
-            sums.xi_y[l] = whole(7);
-            for n in 0..3 {
-                sums.stretch[n][l] = whole(8 + n);
-            }
-        }
-        if N >= 14 {
-            for n in 0..3 {
-                sums.hidden[n][l] = whole(11 + n);
-            }
-        }
+    [sums.zeta, sums.xi, sums.side_x, sums.side_y] = [totals[0], totals[1], totals[2], totals[3]];
+    if N >= 11 {
+        [sums.zeta_x, sums.zeta_y, sums.xi_x, sums.xi_y] = [totals[4], totals[5], totals[6], totals[7]];
+        sums.stretch = [totals[8], totals[9], totals[10]];
+    }
+    if N >= 14 {
+        sums.hidden = [totals[11], totals[12], totals[13]];
+    }
+}
+
+/// Adds up every fourth of sixteen numbers.
+#[inline(always)]
+fn fold(sum: &[f32; LANES], quarters: &mut [f32; 4]) {
+    let mut half = [0.0f32; 8];
+    for l in 0..8 {
+        half[l] = sum[l] + sum[l + 8];
+    }
+    for l in 0..4 {
+        quarters[l] += half[l] + half[l + 4];
     }
 }
 

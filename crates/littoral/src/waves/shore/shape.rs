@@ -255,7 +255,7 @@ pub(super) struct Lace(Vec<f32>);
 impl Lace {
     const SIDE: usize = 256;
     /// Metres between nodes of the pattern.
-    const SPACING: f64 = 0.35;
+    const SPACING: f64 = 0.24;
 
     pub(super) fn new() -> Lace {
         // Distance to the nearest border between cells of scattered points (S. Worley 1996), bent and of two sizes.
@@ -278,15 +278,15 @@ impl Lace {
                     }
                 }
             }
-            second - first
+            (second - first, first)
         };
         let value = |i: i64| {
             let (x, y) = ((i % side) as f64, (i / side) as f64);
             let bend = |n: f64| 3.0 * libm::sin(TAU * n / side as f64 * 5.0);
             let p = (x + bend(y) + 0.4 * bend(1.7 * y), y + bend(x + 40.0));
-            let (wide, fine) = (cells(p, 16, 71), cells(p, 8, 72));
+            let ((wide, _), (fine, _), (_, patch)) = (cells(p, 16, 71), cells(p, 8, 72), cells(p, 64, 73));
             let thread = |d: f64| 1.0 - (d * 2.2).min(1.0);
-            (0.62 * thread(wide) + 0.38 * thread(fine)) as f32
+            (0.45 * thread(wide) + 0.33 * thread(fine) + 0.5 * (1.0 - patch.min(1.0))) as f32
         };
         let mut values: Vec<f32> = (0..side * side).map(value).collect();
         // Ranked, so that a threshold covers the part of the area that it says.

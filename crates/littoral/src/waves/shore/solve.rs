@@ -6,7 +6,7 @@
 
 use super::super::{OutOfRange, PlaneWave, StillWater};
 use super::bed::Bed;
-use super::lanes::LANES;
+use super::lanes::{Complex, LANES};
 use super::march::{self, March, Node, Record, STEPS, Told, Waves};
 use super::{Cancelled, Settings, ShoreError};
 use glam::DVec2;
@@ -71,8 +71,12 @@ pub(super) struct Batch {
     nodes: Vec<Node>,
     pub(super) records: Vec<Record>,
     pub(super) told: Vec<Told>,
-    /// Told by the march before.
+    /// Energy (m²) of the other batches, told by the march before.
     before: Vec<f32>,
+    /// The last row before waves began to break, where the second march may begin: which, the waves, and what of them had not broken.
+    kept: Option<usize>,
+    kept_b: Vec<Complex>,
+    kept_whole: Vec<f32>,
 }
 
 /// Directions of march: along x, along y, against x, against y.
@@ -250,7 +254,7 @@ pub(super) fn solve(
     let wavelength = if mean > 0.0 { TAU / mean } else { 50.0 };
     grid.lay(bed, depth, wavelength, settings, smooth, other);
     gather(batches, waves, depth, grid);
-    let rows: usize = batches.iter().map(|b| if b.axis % 2 == 0 { grid.columns } else { grid.rows }).sum();
+    let rows: usize = batches.iter().map(|b| if b.axis.is_multiple_of(2) { grid.columns } else { grid.rows }).sum();
     let progress = Progress { done: AtomicUsize::new(0), all: 2 * rows, stopped: AtomicBool::new(false), tell };
     let whole: f64 = waves.iter().map(|w| w.amplitude * w.amplitude).sum();
     let alone = batches.len() < 2;
@@ -277,7 +281,19 @@ pub(super) fn solve(
         let mut broken = false;
         for i in 0..count {
             let total: f32 = batches.iter().map(|b| b.told[i].energy).sum();
-            broken |= total > 0.97 * cap(i);
+            if total > 0.97 * cap(i) {
+                broken = true;
+                for batch in batches.iter_mut() {
+                    let first = batch.kept.unwrap_or(0);
+                    let (column, row) = (i % grid.columns, i / grid.columns);
+                    let forward = if batch.axis.is_multiple_of(2) { column } else { row };
+                    let steps = if batch.axis.is_multiple_of(2) { grid.columns } else { grid.rows };
+                    let step = if batch.axis >= 2 { steps - 1 - forward } else { forward };
+                    if step < first {
+                        batch.kept = None;
+                    }
+                }
+            }
         }
         if !broken {
             break;
@@ -356,6 +372,7 @@ fn gather(batches: &mut Vec<Batch>, waves: &[PlaneWave], depth: f64, grid: &Grid
             let list = batch.waves.get_or_insert_with(Waves::new);
             list.prepare(waves, &batch.members, depth, grid, march);
             batch.before.clear();
+            batch.kept = None;
         }
     }
     batches.truncate(used);
@@ -373,7 +390,7 @@ impl Waves {
             // Waves whose own wave number is not that of still water keep the ratio.
             let ratio = k / water.wavenumber(omega);
             for (step, entry) in self.table.iter_mut().enumerate() {
-                let s = (step as f64 / STEPS as f64).max(1e-3).min(1.0);
+                let s = (step as f64 / STEPS as f64).clamp(1e-3, 1.0);
                 let h = if s >= 1.0 { f64::INFINITY } else { SCALE * s * s / (1.0 - s * s) };
                 let here = StillWater { depth: h, ..StillWater::DEEP };
                 let k = quick(omega, h);
@@ -381,7 +398,7 @@ impl Waves {
                 entry[1].0[l] = here.group_speed(k) as f32;
             }
             let forward = AXES[axis];
-            let across = if axis % 2 == 0 { wave.wavenumber.y } else { wave.wavenumber.x };
+            let across = if axis.is_multiple_of(2) { wave.wavenumber.y } else { wave.wavenumber.x };
             let step = grid.spacing.max_element();
             self.across.0[l] = across as f32;
             self.finest.0[l] = (k + 2.4 / step) as f32;
@@ -425,13 +442,13 @@ pub(super) fn quick(omega: f64, depth: f64) -> f64 {
 impl Batch {
     /// Marches over the whole grid; false if it was told to stop.
     fn walk(&mut self, grid: &Grid, share: f32, rim: f32, settings: &Settings, progress: &Progress<'_>) -> bool {
-        let Batch { axis, waves, march, nodes, records, told, before, .. } = self;
+        let Batch { axis, waves, march, nodes, records, told, before, kept, kept_b, kept_whole, .. } = self;
         let Some(waves) = waves else { return true };
         let (columns, rows) = (grid.columns, grid.rows);
         let count = columns * rows;
         records.resize(count, Record::NONE);
         told.resize(count, Told::default());
-        let along_x = *axis % 2 == 0;
+        let along_x = axis.is_multiple_of(2);
         let (steps, across) = if along_x { (columns, rows) } else { (rows, columns) };
         let (forward, apart) =
             if along_x { (grid.spacing.x, grid.spacing.y) } else { (grid.spacing.y, grid.spacing.x) };
@@ -439,12 +456,18 @@ impl Batch {
         let (apron_along, apron_across) =
             if along_x { (grid.apron[0], grid.apron[1]) } else { (grid.apron[1], grid.apron[0]) };
         march.start(across);
+        let again = !before.is_empty();
+        let first = if again { kept.unwrap_or(0) } else { 0 };
+        if first > 0 {
+            march.b.copy_from_slice(kept_b);
+            march.whole.copy_from_slice(kept_whole);
+        }
         nodes.resize(across, Node::default());
         let at = |step: usize, j: usize| {
             let step = if backward { steps - 1 - step } else { step };
             if along_x { j * columns + step } else { step * columns + j }
         };
-        for step in 0..steps {
+        for step in first..steps {
             let out = outward(step, steps, apron_along);
             for (j, node) in nodes.iter_mut().enumerate() {
                 let i = at(step, j);
@@ -459,7 +482,15 @@ impl Batch {
                     others: if before.is_empty() { 0.0 } else { before[i] },
                 };
             }
+            if !again && kept.is_none() {
+                kept_b.clone_from(&march.b);
+                kept_whole.clone_from(&march.whole);
+            }
             march::settle(march, waves, nodes, share);
+            // Well before the limit, for what the other batches come to is only guessed in the first march.
+            if !again && kept.is_none() && nodes.iter().zip(&march.told).any(|(n, t)| t.energy * share > 0.3 * n.cap) {
+                *kept = Some(step);
+            }
             for j in 0..across {
                 let i = at(step, j);
                 records[i] = march.records[j];
