@@ -290,6 +290,7 @@ impl Sea {
                 }
             }
             let mut open = false;
+            #[allow(clippy::needless_range_loop, reason = "a lane of many arrays")]
             for i in 0..BLOCK {
                 let off_x = (places.x[i] - rest.x[i] - f64::from(motion.dx[i])) as f32;
                 let off_y = (places.y[i] - rest.y[i] - f64::from(motion.dy[i])) as f32;

@@ -243,8 +243,9 @@ mod tests {
         let raster = land.raster();
         let (columns, rows) = (raster.columns(), raster.rows());
         let mut wet = vec![false; columns * rows];
-        let border =
-            |i: &usize| i % columns == 0 || i % columns == columns - 1 || i / columns == 0 || i / columns == rows - 1;
+        let border = |i: &usize| {
+            i.is_multiple_of(columns) || i % columns == columns - 1 || i / columns == 0 || i / columns == rows - 1
+        };
         let mut queue: Vec<usize> = (0..columns * rows).filter(border).collect();
         while let Some(i) = queue.pop() {
             if wet[i] || f64::from(raster.heights()[i]) > level {

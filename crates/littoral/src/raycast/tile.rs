@@ -303,7 +303,7 @@ pub(super) fn walk<L: Lanes>(l: L, scene: &Scene, beam: &Beam<L>, outcome: &mut 
     // Rays left over have met nothing, unless the beam is given up.
     let mut given_up = false;
     while strip <= major.last {
-        let next = (((strip + major.base) >> level) + 1 << level) - major.base;
+        let next = ((((strip + major.base) >> level) + 1) << level) - major.base;
         let (a, b) = (larger(strip as f32 - major.at, 0.0), next as f32 - major.at);
         let width = hair + 2e-6 * b;
         let (low, high) = (minor.here + a * slope_low - width, minor.here + b * slope_high + width);

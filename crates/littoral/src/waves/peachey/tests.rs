@@ -45,7 +45,7 @@ fn crests_turn_as_snell_says() {
         for i in 0..200 {
             let (x, y) = (20.0 + f64::from(i % 20) * 29.0, -40.0 - f64::from(i) * 5.5);
             let here = waves.at(train, x, y);
-            let k = wavenumber(deep, 0.02 * -y.min(0.0).max(-1000.0)) / TAU;
+            let k = wavenumber(deep, 0.02 * -y.clamp(-1000.0, 0.0)) / TAU;
             // sin α over the phase speed is constant, and the wave as long as the depth wants it.
             assert!(
                 (here.cycles[1] - kept).abs() < 0.01 * kept.abs() + 1e-6,
