@@ -186,7 +186,7 @@ impl Sea {
 
     /// Height of the water (m above the datum) at a place (m).
     pub fn height_at(&self, at: DVec2) -> f64 {
-        let found = self.find_displaced(&Points::at(at.x, at.y), None);
+        let found = self.find_displaced(&Points::at(at.x, at.y));
         self.level + f64::from(found.motion.dz[0])
     }
 
@@ -198,7 +198,7 @@ impl Sea {
         assert_eq!(places.len(), heights.len(), "expected as many heights as places");
         let blocks = places.par_chunks(BLOCK).zip(heights.par_chunks_mut(BLOCK));
         blocks.with_min_len(64).for_each(|(places, heights)| {
-            let found = self.find_displaced(&block(places), None);
+            let found = self.find_displaced(&block(places));
             for (height, dz) in heights.iter_mut().zip(found.motion.dz) {
                 *height = self.level + f64::from(dz);
             }
@@ -208,7 +208,7 @@ impl Sea {
     /// The surface of the water at a place (m), without what is finer than a footprint (m, 0 for everything).
     pub fn surface_at(&self, at: DVec2, footprint: f32) -> Surface {
         let points = Points { footprint: [footprint; BLOCK], ..Points::at(at.x, at.y) };
-        self.surface(&self.find(&points, None), 0)
+        self.surface(&self.find(&points, None, 0.0), 0)
     }
 
     /// The surface at many places, in parallel; to the bit what [`Sea::surface_at`] says.
@@ -220,7 +220,7 @@ impl Sea {
         let blocks = places.par_chunks(BLOCK).zip(surfaces.par_chunks_mut(BLOCK));
         blocks.with_min_len(32).for_each(|(places, surfaces)| {
             let points = Points { footprint: [footprint; BLOCK], ..block(places) };
-            let found = self.find(&points, None);
+            let found = self.find(&points, None, 0.0);
             for (lane, surface) in surfaces.iter_mut().enumerate() {
                 *surface = self.surface(&found, lane);
             }
@@ -237,7 +237,7 @@ impl Sea {
         let blocks = points.par_chunks(BLOCK).zip(velocities.par_chunks_mut(BLOCK));
         blocks.with_min_len(32).for_each(|(points, velocities)| {
             let places: [DVec2; BLOCK] = std::array::from_fn(|i| points[i.min(points.len() - 1)].truncate());
-            let found = self.find_displaced(&block(&places), None);
+            let found = self.find_displaced(&block(&places));
             let depth = |i: usize| {
                 let surface = self.level + f64::from(found.motion.dz[i]);
                 (surface - points[i.min(points.len() - 1)].z).max(0.0) as f32
@@ -258,9 +258,10 @@ impl Sea {
         velocity[0]
     }
 
-    /// Which water is at some places, and everything about its motion. A guess of where it rests saves time.
-    pub(crate) fn find(&self, places: &Points, guess: Option<&Points>) -> Found {
-        let mut found = self.find_displaced(places, guess);
+    /// Which water is at some places, to within [`Sea::TOLERANCE`] or a share `fine` of the footprint, and everything about its motion. A guess of
+    /// where it rests saves time.
+    pub(crate) fn find(&self, places: &Points, guess: Option<&Points>, fine: f32) -> Found {
+        let mut found = self.find_to(places, guess, fine);
         found.motion = Motion::STILL;
         self.models.iter().for_each(|m| m.add_motion(&found.rest, &mut found.motion));
         found
@@ -271,8 +272,12 @@ impl Sea {
         self.models.iter().for_each(|m| m.add_displacement(rest, motion));
     }
 
-    /// The same with displacements only.
-    pub(crate) fn find_displaced(&self, places: &Points, guess: Option<&Points>) -> Found {
+    /// Which water is at some places.
+    fn find_displaced(&self, places: &Points) -> Found {
+        self.find_to(places, None, 0.0)
+    }
+
+    fn find_to(&self, places: &Points, guess: Option<&Points>, fine: f32) -> Found {
         /// Plain iterations, and those with Newton's method after them.
         const PLAIN: usize = 4;
         const NEWTON: usize = 8;
@@ -296,7 +301,7 @@ impl Sea {
                 let off_y = (places.y[i] - rest.y[i] - f64::from(motion.dy[i])) as f32;
                 residual[i] = (off_x * off_x + off_y * off_y).sqrt();
                 // A point that has arrived stays, whatever the others of its block do.
-                if residual[i] > Sea::TOLERANCE && iteration < PLAIN + NEWTON {
+                if residual[i] > Sea::TOLERANCE.max(fine * rest.footprint[i]) && iteration < PLAIN + NEWTON {
                     open = true;
                     let (mut step_x, mut step_y) = (off_x, off_y);
                     if newton {
@@ -402,7 +407,7 @@ impl HeightField for Sea {
         places.par_chunks(BLOCK).zip(heights.par_chunks_mut(BLOCK)).with_min_len(64).for_each(|(places, heights)| {
             let worlds: [DVec2; BLOCK] =
                 std::array::from_fn(|i| self.datum.world(places[i.min(places.len() - 1)], 0.0).0.truncate());
-            let found = self.find_displaced(&block(&worlds), None);
+            let found = self.find_displaced(&block(&worlds));
             for (height, dz) in heights.iter_mut().zip(found.motion.dz) {
                 *height = (self.level + f64::from(dz)) as f32;
             }

@@ -7,7 +7,7 @@
 
 use super::Settings;
 use super::sampler::Patterns;
-use super::shade::{Ahead, Near, Shaded};
+use super::shade::{Ahead, Near, Shaded, shared};
 use super::stage::{Lens, Stage};
 use super::waves::Wet;
 use crate::raycast::LocalRay;
@@ -123,7 +123,7 @@ impl Stage<'_> {
         }
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
-        let wet = self.wet_all(lens, &rays, &distances);
+        let wet = self.wet_all(lens, &rays, &distances, |k| shared(samples.start + (k % per_pixel) as u32), per_pixel);
         let mut shaded: Vec<Shaded> = Vec::with_capacity(rays.len());
         let (mut shadow_rays, mut shadow_of) = (Vec::new(), Vec::new());
         let (mut mirror_rays, mut mirror_of) = (Vec::new(), Vec::new());
@@ -170,16 +170,35 @@ impl Stage<'_> {
         }
     }
 
-    /// Where rays meet the sea; empty where there is none.
-    fn wet_all(&self, lens: &Lens, rays: &[LocalRay], distances: &[f32]) -> Vec<Option<Wet>> {
-        match (lens.sea, self.scene.water) {
-            (Some(sea), Some(water)) => {
-                let mut wet = self.wet(lens, sea, rays, distances);
-                wet.iter_mut().for_each(|w| *w = w.filter(|w| water.covers(w.position.truncate())));
-                wet
+    /// Where rays meet the sea; empty where there is none. Rays are `per_pixel` for each pixel; of `share` that follow one another the first
+    /// lends its piece of surface, which is already averaged over the pixel, to the others.
+    fn wet_all(
+        &self,
+        lens: &Lens,
+        rays: &[LocalRay],
+        distances: &[f32],
+        share: impl Fn(usize) -> u32,
+        per_pixel: usize,
+    ) -> Vec<Option<Wet>> {
+        let (Some(sea), Some(water)) = (lens.sea, self.scene.water) else { return Vec::new() };
+        let mut wet = vec![None; rays.len()];
+        let trace = |wanted: &[usize], wet: &mut [Option<Wet>]| {
+            let rays: Vec<LocalRay> = wanted.iter().map(|&k| rays[k]).collect();
+            let grounds: Vec<f32> = wanted.iter().map(|&k| distances[k]).collect();
+            for (&k, found) in wanted.iter().zip(self.wet(lens, sea, &rays, &grounds)) {
+                wet[k] = found.filter(|w| water.covers(w.position.truncate()));
             }
-            _ => Vec::new(),
+        };
+        let lender = |k: usize| k - (k % per_pixel) % share(k) as usize;
+        let (lenders, others): (Vec<usize>, Vec<usize>) = (0..rays.len()).partition(|&k| lender(k) == k);
+        trace(&lenders, &mut wet);
+        // Where the first met no water the others see for themselves.
+        let (lent, alone): (Vec<usize>, Vec<usize>) = others.into_iter().partition(|&k| wet[lender(k)].is_some());
+        for k in lent {
+            wet[k] = wet[lender(k)].and_then(|w| w.lent(lens.eye, &rays[k], distances[k]));
         }
+        trace(&alone, &mut wet);
+        wet
     }
 
     /// What is seen through the middle of each pixel: the passes, which no filter may touch.
@@ -193,7 +212,7 @@ impl Stage<'_> {
         let rays: Vec<LocalRay> = places.map(ray).collect();
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
-        let wet = self.wet_all(lens, &rays, &distances);
+        let wet = self.wet_all(lens, &rays, &distances, |_| 1, 1);
         let seen = rays.iter().zip(&distances).enumerate().map(|(k, (ray, &distance))| {
             match self.ahead(lens, ray.direction, distance, wet.get(k).copied().flatten()) {
                 // Mist and floor stand for what is not known: nothing was measured there.

@@ -29,6 +29,19 @@ pub struct Wet {
 }
 
 impl Wet {
+    /// This piece of surface, level with its slope, as another ray of the same pixel meets it before the ground at `end` (m).
+    pub fn lent(&self, eye: DVec3, ray: &LocalRay, end: f32) -> Option<Wet> {
+        let (origin, ahead) = (eye + ray.origin.as_dvec3(), ray.direction.as_dvec3());
+        let slope = self.slope.as_dvec2();
+        let away = self.position - origin;
+        let near = away.length();
+        let t = (away.z - slope.dot(away.truncate())) / (ahead.z - slope.dot(ahead.truncate()));
+        let t = if t.is_finite() { t.clamp(0.8 * near, 1.25 * near) } else { near };
+        let position = origin + ahead * t;
+        let rest = self.rest + (position - self.position).truncate();
+        (t <= f64::from(end)).then_some(Wet { position, rest, ..*self })
+    }
+
     /// As ripples.
     pub fn ripples(&self) -> Ripples {
         Ripples { slope: self.slope, hidden: self.hidden + Vec3::new(FINEST, 0.0, FINEST) }
@@ -40,6 +53,8 @@ const FINEST: f32 = 3e-4;
 
 /// Slopes that steps allow for: waves steeper than this are breaking, and no wider than a step where they do.
 const STEEP: f32 = 0.7;
+/// How near water must be found to where it is looked for, in footprints.
+const FINE: f32 = 0.01;
 /// Steps through the slab before a ray is given up.
 const STEPS: usize = 160;
 /// Steps of closing in on a crossing.
@@ -143,6 +158,18 @@ impl Stage<'_> {
             lane.below = Some((lane.at, 0.0));
         }
         for _ in 0..CLOSE {
+            // Near enough, for what a pixel can show.
+            let open = |l: &Lane| match l.below {
+                Some((t, depth)) => {
+                    let (s, clear) = l.above;
+                    let fine = 0.02 * f64::from(self.footprint(lens, t as f32, -l.direction.z as f32));
+                    !(clear.min(-depth) <= fine * (steep + 0.05) || t - s <= fine)
+                }
+                None => false,
+            };
+            if !lanes.iter().any(open) {
+                break;
+            }
             for lane in &mut lanes {
                 if let Some((t, depth)) = lane.below {
                     let (s, clear) = lane.above;
@@ -175,7 +202,7 @@ impl Stage<'_> {
             points.footprint[i] = self.footprint(lens, lane.at as f32, -lane.direction.z as f32);
             (guess.x[i], guess.y[i]) = (at.x - lane.offset.x, at.y - lane.offset.y);
         }
-        let found = sea.find(&points, Some(&guess));
+        let found = sea.find(&points, Some(&guess), FINE);
         let wet = |i: usize| {
             lanes[i].below?;
             let at = DVec2::new(points.x[i], points.y[i]);

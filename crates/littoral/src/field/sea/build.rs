@@ -13,7 +13,7 @@ use glam::DVec2;
 use std::f64::consts::TAU;
 
 /// Discrete waves over a bed.
-const COMPONENTS: usize = 48;
+const COMPONENTS: usize = 32;
 /// Nodes of the bed's grid along its longer side, at most.
 const NODES: usize = 640;
 /// Up to this times the highest peak's frequency waves are carried over the bed.
