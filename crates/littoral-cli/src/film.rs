@@ -237,7 +237,7 @@ impl Order<'_> {
 /// exposure that follows every frame pumps.
 fn steady_grey(flight: &Flight<'_>, stage: &Stage<'_>, view: &dyn Fn(f64, UVec2) -> View) -> f32 {
     const PROBES: usize = 7;
-    let settings = Settings { samples: 1, seed: 0 };
+    let settings = Settings { samples: 1, passes: false, ..Settings::default() };
     let grey = |i: usize| {
         let time = flight.duration() * (i as f64 + 0.5) / PROBES as f64;
         stage.render(&view(time, UVec2::new(96, 54)), &settings, &|_| {}).grey()

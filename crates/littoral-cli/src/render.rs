@@ -231,7 +231,7 @@ impl Render {
         };
         let stage = Stage::new(&scene);
         let mut sea = self.waves(&subject, talk)?;
-        let settings = Settings { samples: self.samples, seed: self.seed };
+        let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
             return film.run(&subject, &stage, sea.as_mut(), &settings, started, talk);
         }

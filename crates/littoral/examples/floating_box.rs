@@ -151,7 +151,7 @@ fn pictures(beaufort: f64, folder: &str) -> Result<(), Box<dyn Error>> {
             sea.set_time(f64::from(600 + 2 * frame + half) * STEP);
             float.step(&sea);
         }
-        let mut picture = stage.render_sea(Some(&sea), &view, &Settings { samples: 8, seed: 0 }, &|_| {});
+        let mut picture = stage.render_sea(Some(&sea), &view, &Settings { samples: 8, ..Settings::default() }, &|_| {});
         let grey = *grey.get_or_insert(picture.grey());
         paint(&float, &view, &scene.sun.direction(0.0), &mut picture, grey);
         let display = Display { exposure: littoral::picture::Exposure::Grey(grey), ..Display::default() };

@@ -189,11 +189,13 @@ pub struct Settings {
     pub samples: u32,
     /// Which random pattern; pictures of the same seed are the same to the bit.
     pub seed: u32,
+    /// Whether depth, normal, position and height of what is seen are wanted, too. It costs a ray more for each pixel.
+    pub passes: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { samples: 12, seed: 0 }
+        Settings { samples: 12, seed: 0, passes: true }
     }
 }
 

@@ -92,7 +92,10 @@ impl Stage<'_> {
             let unsettled: Vec<usize> = all.iter().copied().filter(|&i| !settled(&sums, width, i)).collect();
             self.sample(mosaic, &unsettled, &place, first..samples, &mut sums);
         }
-        let middles = self.middles(mosaic, all.iter().map(|&i| place(i)));
+        let middles = match mosaic.settings.passes {
+            true => self.middles(mosaic, all.iter().map(|&i| place(i))),
+            false => vec![None; all.len()],
+        };
         let finished = sums.iter().zip(middles).map(|(sum, middle)| {
             let share = 1.0 / sum.count as f32;
             Pixel { radiance: sum.light * share, coverage: 1.0 - sum.sky as f32 * share, middle }
@@ -321,7 +324,7 @@ mod tests {
             let view = View::looking_at(eye, DVec3::new(20.0, 30.0, 0.0), 0.7, UVec2::new(40, 26));
             let scene = Scene { border, style, sun: Sun::new(4.0, 0.4), ..Scene::new(&land, water.as_ref()) };
             let stage = Stage::new(&scene);
-            let settings = Settings { samples: 6, seed };
+            let settings = Settings { samples: 6, seed, passes: true };
             let by = |cast| {
                 let caster = OneByOne { land: &stage.ground.land, eye, cast };
                 stage.render_with(&caster, None, &view, &settings, &|_| {})
