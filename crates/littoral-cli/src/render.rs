@@ -103,7 +103,7 @@ pub struct Render {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PASS,…", help_heading = "Quality")]
     passes: Vec<Pass>,
     /// Rays through each pixel: more is smoother and slower
-    #[arg(long, value_name = "N", default_value = "12", value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Quality")]
+    #[arg(long, value_name = "N", default_value = "10", value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Quality")]
     samples: u32,
     /// Which random pattern the rays follow; the same seed gives the same picture to the bit
     #[arg(long, value_name = "N", default_value = "0", help_heading = "Quality")]

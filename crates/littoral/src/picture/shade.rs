@@ -115,7 +115,7 @@ struct Look<'a> {
 }
 
 /// Samples that share one look-up: two of the first few, so that these can disagree, and four of the others.
-pub(super) fn shared(index: u32) -> u32 {
+fn shared(index: u32) -> u32 {
     if index < FIRST { 2 } else { 4 }
 }
 

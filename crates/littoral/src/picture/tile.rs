@@ -7,7 +7,7 @@
 
 use super::Settings;
 use super::sampler::Patterns;
-use super::shade::{Ahead, Near, Shaded, shared};
+use super::shade::{Ahead, Near, Shaded};
 use super::stage::{Lens, Stage};
 use super::waves::Wet;
 use crate::raycast::LocalRay;
@@ -20,6 +20,8 @@ pub const TILE: u32 = 16;
 /// Samples that every pixel gets, and the share of all that it does at least.
 pub const FIRST: u32 = 4;
 const LEAST_SHARE: u32 = 4;
+/// Samples of a pixel that share one piece of the sea's surface.
+const LENT: usize = 6;
 /// Contrast (largest over smallest luminance, less one) that calls for all samples: between those of a pixel, and between neighbours.
 const DISAGREE: f32 = 0.12;
 const DIFFER: f32 = 0.18;
@@ -126,7 +128,7 @@ impl Stage<'_> {
         }
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
-        let wet = self.wet_all(lens, &rays, &distances, |k| shared(samples.start + (k % per_pixel) as u32), per_pixel);
+        let wet = self.wet_all(lens, &rays, &distances, LENT, per_pixel);
         let mut shaded: Vec<Shaded> = Vec::with_capacity(rays.len());
         let (mut shadow_rays, mut shadow_of) = (Vec::new(), Vec::new());
         let (mut mirror_rays, mut mirror_of) = (Vec::new(), Vec::new());
@@ -180,7 +182,7 @@ impl Stage<'_> {
         lens: &Lens,
         rays: &[LocalRay],
         distances: &[f32],
-        share: impl Fn(usize) -> u32,
+        share: usize,
         per_pixel: usize,
     ) -> Vec<Option<Wet>> {
         let (Some(sea), Some(water)) = (lens.sea, self.scene.water) else { return Vec::new() };
@@ -192,7 +194,7 @@ impl Stage<'_> {
                 wet[k] = found.filter(|w| water.covers(w.position.truncate()));
             }
         };
-        let lender = |k: usize| k - (k % per_pixel) % share(k) as usize;
+        let lender = |k: usize| k - (k % per_pixel) % share;
         let (lenders, others): (Vec<usize>, Vec<usize>) = (0..rays.len()).partition(|&k| lender(k) == k);
         trace(&lenders, &mut wet);
         // Where the first met no water the others see for themselves.
@@ -215,7 +217,7 @@ impl Stage<'_> {
         let rays: Vec<LocalRay> = places.map(ray).collect();
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
-        let wet = self.wet_all(lens, &rays, &distances, |_| 1, 1);
+        let wet = self.wet_all(lens, &rays, &distances, 1, 1);
         let seen = rays.iter().zip(&distances).enumerate().map(|(k, (ray, &distance))| {
             match self.ahead(lens, ray.direction, distance, wet.get(k).copied().flatten()) {
                 // Mist and floor stand for what is not known: nothing was measured there.
