@@ -128,3 +128,20 @@ fn still_water_is_level() {
     let range = sea.range(Cell::face(0));
     assert!(range.contains(2.25) && range.high - range.low < 1e-3);
 }
+
+#[test]
+fn a_bed_takes_every_state() {
+    // A beach on one side, from dry land to deep water, a few metres of it too shallow for any wave.
+    let heights = (0..48 * 40).map(|i| 3.0 - 0.02 * ((i % 48) as f32).powi(2)).collect();
+    let land = Land::at(Raster::new(48, 40, DVec2::splat(12.0), heights).expect("a bed"), DVec2::ZERO);
+    let water = Water::flood(&land, 0.0).expect("wet");
+    for number in 1..=12 {
+        let state = SeaState::beaufort(f64::from(number), 3.0).expect("a number");
+        let sea = Sea::over(&land, &water, &state, &|_| true).unwrap_or_else(|e| panic!("beaufort {number}: {e}"));
+        for i in 0..40 {
+            let at = DVec2::new(f64::from(i) * 17.0 - 60.0, 200.0);
+            assert!(sea.height_at(at).abs() < 2.5 * state.significant_height().max(0.2), "beaufort {number} at {at}");
+        }
+    }
+    assert!(Sea::over(&land, &water, &SeaState::CALM, &|_| true).expect("calm").height_at(DVec2::ONE) == 0.0);
+}

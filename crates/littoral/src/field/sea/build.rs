@@ -152,7 +152,8 @@ fn shelter(bed: &Bed, shore: &ShoreSea, height: f64) -> Result<Shelter, OutOfRan
         let most = 0.5 * bed.depths()[i].max(0.0) / (height as f32).max(1e-3);
         // Smoothly towards 1.
         let room = most / (1.0 + most * most * most * most).sqrt().sqrt();
-        (climate.significant_height / open).min(1.0) * room
+        // Rounding may carry the last bit beyond 1.
+        ((climate.significant_height / open).min(1.0) * room).clamp(0.0, 1.0)
     };
     Shelter::new(bed.origin(), spacing, columns, rows, (0..columns * rows).map(factor).collect())
 }
