@@ -359,19 +359,8 @@ impl Stage<'_> {
 
     /// How much of what lies at a place beyond the raster is sea, in [0, 1]: as much as of the border next to it.
     fn open_sea(&self, at: DVec2) -> f32 {
-        let (low, high) = (self.scene.land.origin(), self.scene.land.origin() + self.scene.land.extent());
-        let border = at.clamp(low, high);
-        let away = (at - border).length();
-        let Some(water) = self.scene.water.filter(|_| away > 0.0) else { return 1.0 };
-        // The further out, the wider the stretch of border that counts; as far as the land is wide, all of it.
-        let along = (at - border).perp().normalize_or(DVec2::X);
-        let span = 0.25 * away + 2.0 * f64::from(self.ground.spacing());
-        let wet = (-4..=4).filter(|k| {
-            let place = (border + along * (f64::from(*k) * 0.25 * span)).clamp(low, high);
-            let ground = self.scene.land.height_at(place);
-            water.covers(place) && ground.is_some_and(|h| f64::from(h) <= water.level)
-        });
-        step(0.15, 0.85, wet.count() as f32 / 9.0)
+        let beyond = self.rim.as_ref().map(|rim| rim.beyond(at)).filter(|beyond| beyond.away > 0.0);
+        beyond.map_or(1.0, |beyond| step(0.15, 0.85, beyond.wet))
     }
 
     /// The water at a place, as a pixel sees it.
@@ -419,12 +408,13 @@ impl Stage<'_> {
 
     /// Depth of the water at a world position (m). Beyond the raster the bed sinks on.
     fn depth(&self, at: DVec2) -> f32 {
-        let Some(water) = self.scene.water else { return 0.0 };
-        let land = &self.ground.land;
-        let inside = at.clamp(land.origin(), land.origin() + land.extent());
-        let bed = land.height_at(inside).unwrap_or(f32::NEG_INFINITY);
-        let beyond = (at - inside).length() as f32;
-        (water.level as f32 - bed + 0.03 * beyond).clamp(0.0, 1e4)
+        let (Some(water), Some(rim)) = (self.scene.water, &self.rim) else { return 0.0 };
+        let beyond = rim.beyond(at);
+        if beyond.away > 0.0 {
+            return beyond.depth + 0.03 * beyond.away as f32;
+        }
+        let bed = self.ground.land.height_at(at).unwrap_or(f32::NEG_INFINITY);
+        (water.level as f32 - bed).clamp(0.0, 1e4)
     }
 
     /// What water mirrors along a ray that meets the ground at `distance` (m): sky, or the land as it looks from afar.

@@ -4,6 +4,7 @@ use super::atmosphere::{Atmosphere, EARTH, Sky};
 use super::block::{MIST, Wall};
 use super::cartography::Tints;
 use super::ground::Ground;
+use super::rim::Rim;
 use super::sampler::Patterns;
 use super::sea::Depths;
 use super::shade::Ahead;
@@ -32,6 +33,8 @@ pub struct Stage<'a> {
     /// Radiance of mist (kcd/m²).
     pub(super) mist: Vec3,
     pub(super) tints: Tints,
+    /// The land's border, where water goes on beyond it.
+    pub(super) rim: Option<Rim>,
 }
 
 /// Casts many rays whose origins count from the eye. There is one for pictures, and one for tests that shows it right.
@@ -81,7 +84,8 @@ impl<'a> Stage<'a> {
         let open = irradiance(&skylight.open, Vec3::Z);
         let mist = MIST / std::f32::consts::PI * (air.sunlight(middle.max(0.0)) * sun.z.max(0.0) + open);
         let tints = Tints::of(&ground, range, level);
-        Stage { scene: *scene, tints, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
+        let rim = scene.water.map(|water| Rim::new(scene.land, &ground.land, water));
+        Stage { scene: *scene, tints, ground, air, sky, skylight, depths: Depths::new(), sun, mist, rim }
     }
 
     /// Whether the style is that of a map, on which water is a colour.
@@ -169,8 +173,8 @@ impl<'a> Stage<'a> {
         let direction = direction.as_dvec3();
         let ground = f64::from(ground);
         if let Some(block) = &self.ground.block {
-            let level = |at| self.level_within(at);
-            if let Some(wall) = block.wall(&self.ground.land, eye, direction, &level) {
+            let wet = |at| self.is_in_water(lens, at);
+            if let Some(wall) = block.wall(&self.ground.land, eye, direction, &wet) {
                 return Ahead::Wall(wall);
             }
         }

@@ -149,7 +149,6 @@ pub struct ShoreSea {
     /// Mean angular frequency (rad/s).
     frequency: f32,
     breaking: f32,
-    lace: shape::Lace,
     time: f64,
     bounds: Bounds,
     /// Largest amplitude (m) of each component by octaves of its local wavelength.
@@ -228,7 +227,6 @@ impl ShoreSea {
             open: Place::default(),
             frequency: 1.0,
             breaking: BREAKING,
-            lace: shape::Lace::new(),
             time: 0.0,
             bounds: Bounds::default(),
             by_length: Vec::new(),

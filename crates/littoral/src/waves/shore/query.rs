@@ -325,8 +325,7 @@ pub(super) fn motion(sea: &ShoreSea, points: &Points, motion: &mut Motion) {
         motion.hidden_yy[l] += sums.hidden[2][l];
     }
     for l in 0..LANES {
-        let at = (points.x[l], points.y[l]);
-        let foam = sea.lace.foam(&sums, l, sea.frequency, sea.breaking, at, points.footprint[l]);
+        let foam = shape::foam(&sums, l, sea.frequency, sea.breaking);
         motion.foam[l] = motion.foam[l].max(foam);
     }
 }
