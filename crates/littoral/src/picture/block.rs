@@ -95,12 +95,14 @@ impl Block {
 impl Stage<'_> {
     /// Whether a point within the block and above the ground lies in the water, waves and all.
     pub(super) fn is_in_water(&self, lens: &Lens, at: DVec3) -> bool {
-        self.scene.water.filter(|w| !self.is_map() && w.covers(at.truncate())).is_some_and(|water| match lens.sea {
-            // Above or below all waves there is no need to ask for them.
-            Some(sea) if (at.z - water.level).abs() < f64::from(sea.bounds().height) => {
-                at.z <= sea.height_at(at.truncate())
+        self.scene.water.filter(|_| !self.is_map() && self.may_be_wet(at.truncate())).is_some_and(|water| {
+            match lens.sea {
+                // Above or below all waves there is no need to ask for them.
+                Some(sea) if (at.z - water.level).abs() < f64::from(sea.bounds().height) => {
+                    at.z <= sea.height_at(at.truncate())
+                }
+                _ => at.z <= water.level,
             }
-            _ => at.z <= water.level,
         })
     }
 

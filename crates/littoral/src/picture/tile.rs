@@ -185,9 +185,9 @@ impl Stage<'_> {
         share: usize,
         per_pixel: usize,
     ) -> Vec<Option<Wet>> {
-        let (Some(sea), Some(water)) = (lens.sea, self.scene.water) else { return Vec::new() };
+        let Some(sea) = lens.sea else { return Vec::new() };
         let mut wet = vec![None; rays.len()];
-        let there = |at: DVec2| water.covers(at) && self.ground.block.is_none_or(|block| block.holds(at));
+        let there = |at: DVec2| self.may_be_wet(at) && self.ground.block.is_none_or(|block| block.holds(at));
         let trace = |wanted: &[usize], wet: &mut [Option<Wet>]| {
             let rays: Vec<LocalRay> = wanted.iter().map(|&k| rays[k]).collect();
             let grounds: Vec<f32> = wanted.iter().map(|&k| distances[k]).collect();

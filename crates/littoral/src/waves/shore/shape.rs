@@ -248,6 +248,29 @@ pub(super) fn profile_slope(
     (f_d * numerator + f * numerator_d - f * numerator * denominator_d / denominator) / denominator
 }
 
+/// Greatest swing of the swash in those that 2 % of the waves reach.
+pub(super) const FARTHEST: f32 = 1.3;
+/// The wave (m per m of significant height) that 2 % are higher than: 2.8 √m₀.
+const USUAL: f32 = 0.7;
+
+/// How far (m) set-up and swash have raised the water at lane `l`.
+#[inline(always)]
+pub(super) fn swash(sums: &Sums, l: usize) -> f32 {
+    let usual = (USUAL * sums.place[Place::HEIGHT][l]).max(1e-4);
+    let wave = (sums.zeta[l] / usual).clamp(-1.0, FARTHEST);
+    sums.place[Place::SWING][l].mul_add(wave, sums.place[Place::SETUP][l])
+}
+
+/// Slope of [`swash`] along an axis, given the derivatives of ζ and the places.
+#[inline(always)]
+pub(super) fn swash_slope(sums: &Sums, l: usize, zeta_d: f32, place: &[[f32; LANES]; 8]) -> f32 {
+    let usual = (USUAL * sums.place[Place::HEIGHT][l]).max(1e-4);
+    let wave = sums.zeta[l] / usual;
+    let held = wave.clamp(-1.0, FARTHEST);
+    let wave_d = if wave == held { (zeta_d - wave * USUAL * place[Place::HEIGHT][l]) / usual } else { 0.0 };
+    place[Place::SWING][l].mul_add(held, sums.place[Place::SWING][l].mul_add(wave_d, place[Place::SETUP][l]))
+}
+
 /// Which part of the water about lane `l` is foam.
 pub(super) fn foam(sums: &Sums, l: usize, frequency: f32, breaking: f32) -> f32 {
     let broken = sums.place[Place::BROKEN][l];
