@@ -348,7 +348,7 @@ impl ShoreSea {
     /// land takes the mean of those around it that have some.
     fn reach_inland(&mut self) {
         const REACH: f64 = 80.0;
-        /// What waves themselves do in there, rather than run up (m).
+        /// What waves themselves do in there, rather than run up (m): they fall to a fiftieth, from which the swash still tells their phase.
         const INLAND: f64 = 4.0;
         const NONE: u32 = u32::MAX;
         let (columns, rows, blocks) = (self.columns, self.rows, self.blocks);
@@ -362,6 +362,7 @@ impl ShoreSea {
         let mut dry: Vec<usize> = (0..columns * rows).filter(|&i| rings[i] == NONE).collect();
         let mut around = Vec::with_capacity(8);
         for ring in 1..=last {
+            let drown = if f64::from(ring) * self.spacing.min_element() < 4.0 * INLAND { drown } else { 1.0 };
             let reached = |rings: &[u32], i: usize, around: &mut Vec<usize>| {
                 let (c, r) = (i % columns, i / columns);
                 around.clear();

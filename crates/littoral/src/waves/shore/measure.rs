@@ -212,7 +212,7 @@ fn cell(sea: &ShoreSea, corners: [Option<usize>; 4], [height, slope, curvature]:
     let swash = greatest(Place::SETUP) + shape::FARTHEST * swing;
     let climbing = spread(Place::SETUP)
         + shape::FARTHEST * spread(Place::SWING)
-        + swing / (0.7 * least_height).max(1e-4) * (slope + spread(Place::HEIGHT));
+        + swing / (0.7 * least_height + 1e-5) * (slope + spread(Place::HEIGHT));
     let own = Bounds {
         height: height * shape::highest(r) + 0.25 * greatest(Place::HEIGHT) * r + swash,
         sideways: height * sideways,

@@ -256,18 +256,26 @@ const USUAL: f32 = 0.7;
 /// How far (m) set-up and swash have raised the water at lane `l`.
 #[inline(always)]
 pub(super) fn swash(sums: &Sums, l: usize) -> f32 {
-    let usual = (USUAL * sums.place[Place::HEIGHT][l]).max(1e-4);
-    let wave = (sums.zeta[l] / usual).clamp(-1.0, FARTHEST);
-    sums.place[Place::SWING][l].mul_add(wave, sums.place[Place::SETUP][l])
+    let usual = USUAL.mul_add(sums.place[Place::HEIGHT][l], 1e-5);
+    let (held, _) = held(sums.zeta[l] / usual);
+    sums.place[Place::SWING][l].mul_add(held, sums.place[Place::SETUP][l])
+}
+
+/// A wave as the swash follows it, smoothly held between -1 and [`FARTHEST`], and the derivative of that.
+#[inline(always)]
+fn held(wave: f32) -> (f32, f32) {
+    let most = if wave < 0.0 { 1.0 } else { FARTHEST };
+    let t = (wave.abs() / (1.5 * most)).min(1.0);
+    ((most * t * (1.5 - 0.5 * t * t)).copysign(wave), 1.0 - t * t)
 }
 
 /// Slope of [`swash`] along an axis, given the derivatives of ζ and the places.
 #[inline(always)]
 pub(super) fn swash_slope(sums: &Sums, l: usize, zeta_d: f32, place: &[[f32; LANES]; 8]) -> f32 {
-    let usual = (USUAL * sums.place[Place::HEIGHT][l]).max(1e-4);
+    let usual = USUAL.mul_add(sums.place[Place::HEIGHT][l], 1e-5);
     let wave = sums.zeta[l] / usual;
-    let held = wave.clamp(-1.0, FARTHEST);
-    let wave_d = if wave == held { (zeta_d - wave * USUAL * place[Place::HEIGHT][l]) / usual } else { 0.0 };
+    let (held, share) = held(wave);
+    let wave_d = share * (zeta_d - wave * USUAL * place[Place::HEIGHT][l]) / usual;
     place[Place::SWING][l].mul_add(held, sums.place[Place::SWING][l].mul_add(wave_d, place[Place::SETUP][l]))
 }
 
