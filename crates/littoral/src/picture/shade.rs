@@ -3,7 +3,7 @@
 use super::Style;
 use super::atmosphere::Veil;
 use super::block::Wall;
-use super::cartography::relief;
+use super::cartography::{LAKE_PAPER, LAKE_TINT, relief};
 use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, Site, natural};
@@ -13,7 +13,7 @@ use super::skylight::irradiance;
 use super::stage::{HIGHEST_EYE, HIGHEST_SWASH, Lens, Stage};
 use super::tile::FIRST;
 use super::waves::Wet;
-use crate::field::Sea;
+use crate::field::{InLake, Sea};
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -190,6 +190,11 @@ impl Stage<'_> {
         shaded
     }
 
+    /// Whether a place lies in a lake.
+    fn in_lake(&self, at: DVec2) -> bool {
+        self.scene.lakes.is_some_and(|lakes| lakes.at(self.scene.land, at).is_some())
+    }
+
     /// A cartographer's paper: no sun, no air, only tones.
     fn painted(&self, lens: &Lens, direction: Vec3, ahead: &Ahead) -> Shaded {
         let paper = Vec3::new(0.90, 0.89, 0.86);
@@ -200,6 +205,7 @@ impl Stage<'_> {
                 let wet = self.scene.water.is_some_and(|w| w.covers(at));
                 let to_sun = self.sun.truncate().normalize_or(Vec2::new(-0.7, 0.7));
                 let ground = relief(&self.ground, &self.tints, at, position.z as f32, footprint, to_sun, wet);
+                let ground = if self.in_lake(at) { LAKE_PAPER } else { ground };
                 paper.lerp(ground, self.ground.known(at))
             }
             Ahead::Wall(wall) => paper * (0.62 + 0.12 * wall.normal.dot(self.sun).max(0.0)),
@@ -286,7 +292,8 @@ impl Stage<'_> {
         };
         if self.scene.style == Style::Tint {
             let wet = self.scene.water.is_some_and(|w| w.covers(at));
-            let Material { albedo, openness, .. } = even(self.tints.colour(position.z as f32, wet));
+            let tint = if self.in_lake(at) { LAKE_TINT } else { self.tints.colour(position.z as f32, wet) };
+            let Material { albedo, openness, .. } = even(tint);
             let normal = normal_of_slope(surface.slope * self.tints.steepening());
             return Material { albedo, normal, openness, wet: 0.0 };
         }
@@ -384,6 +391,9 @@ impl Stage<'_> {
         let ripples = wet.map_or_else(|| ripples(at, footprint), Wet::ripples);
         let raised = wet.map_or(0.0, |_| (position.z + self.drop_at(at) - self.level()) as f32);
         let shown = normal_of_slope(ripples.slope);
+        if let Some(lake) = self.scene.lakes.filter(|_| wet.is_none()).and_then(|l| l.at(self.scene.land, at)) {
+            return self.lake(ripples, &lake);
+        }
         // Into the water, to where the bent ray meets the bed.
         let within = if shown.dot(eye) > 0.02 { refract(direction, shown) } else { refract(direction, Vec3::Z) };
         let down = (-within.z).max(0.3);
@@ -416,6 +426,22 @@ impl Stage<'_> {
             open: self.open_sea(at),
             skylit: up(irradiance(&self.skylight.open, Vec3::Z) * 0.93),
             sunlit: up(self.air.sunlight(0.0) * (sun * (1.0 - fresnel(sun)))),
+        }
+    }
+
+    /// The water of a lake, of which only the surface is known: a bed of mud that falls off from the shore.
+    fn lake(&self, ripples: Ripples, lake: &InLake) -> Pool {
+        const MUD: Vec3 = Vec3::new(0.09, 0.08, 0.055);
+        let depth = (0.07 * lake.to_shore).min(30.0);
+        let down = (-refract(-self.sun, Vec3::Z)).z.max(0.5);
+        let up = |irradiance: Vec3| self.depths.radiance(depth, down, 0.8, irradiance, MUD);
+        let sun = self.sun.z.max(0.0);
+        Pool {
+            ripples,
+            depth,
+            open: 1.0,
+            skylit: up(irradiance(&self.skylight.open, Vec3::Z) * 0.93),
+            sunlit: up(self.air.sunlight(lake.level as f32) * (sun * (1.0 - fresnel(sun)))),
         }
     }
 

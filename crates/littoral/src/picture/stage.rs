@@ -242,7 +242,11 @@ impl<'a> Stage<'a> {
                 }
                 return Ahead::Wall(Wall { position, normal: self.ground.outward(at), ground: position.z });
             }
-            return Ahead::Ground { position };
+            // The ground of a lake, as it was measured, is its surface.
+            return match self.scene.lakes.filter(|_| !self.is_map()).and_then(|lakes| lakes.at(self.scene.land, at)) {
+                Some(lake) => Ahead::Water { position: at.extend(lake.level), wet: None },
+                None => Ahead::Ground { position },
+            };
         }
         if let Some(block) = &self.ground.block {
             return block.floor(eye, direction).map_or(Ahead::Sky, |position| Ahead::Floor { position });
