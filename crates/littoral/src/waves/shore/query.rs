@@ -69,6 +69,9 @@ fn find(sea: &ShoreSea, points: &Points) -> Spots {
     spots
 }
 
+/// The widest footprint (m): wider than any wave.
+const WIDEST: f32 = 1e9;
+
 /// Cells off the grid that are told apart.
 const FAR: f64 = 1e15;
 
@@ -162,7 +165,8 @@ fn gather<const N: usize>(sea: &ShoreSea, points: &Points, sums: &mut Sums) {
                 unpacked = wanted;
             }
             let mut sum = [[0.0f32; LANES]; N];
-            let footprint = points.footprint[point] * (1.0 / std::f32::consts::PI);
+            // Not a number: none.
+            let footprint = points.footprint[point].max(0.0).min(WIDEST) * (1.0 / std::f32::consts::PI);
             let square = footprint * footprint;
             for cell in &cells[..count] {
                 let (p, a) = (&cell.phase, &cell.amplitude);
@@ -350,8 +354,8 @@ pub(super) fn velocity(sea: &ShoreSea, points: &Points, depths: &[f32; BLOCK], v
         if below >= bed {
             continue;
         }
-        let square =
-            (points.footprint[point] / std::f32::consts::PI) * (points.footprint[point] / std::f32::consts::PI);
+        let footprint = points.footprint[point].max(0.0).min(WIDEST) * (1.0 / std::f32::consts::PI);
+        let square = footprint * footprint;
         for block in 0..sea.blocks {
             unpack(sea, &spots, point, block, &mut cell);
             let waves = &sea.lanes[block];
