@@ -1,6 +1,7 @@
 //! `littoral waves`: numbers and plots of waves.
 
 mod dispersion;
+mod height;
 mod picture;
 mod spectrum;
 pub mod state;
@@ -8,12 +9,13 @@ mod summary;
 
 use crate::talk::{Failure, Talk};
 
-/// Waves in numbers and plots: spectra of the sea, and how fast waves run.
+/// Waves in numbers and plots: spectra of the sea, how fast waves run, how high the water stands.
 #[derive(clap::Args)]
 #[command(after_help = "Start here:
   littoral waves spectrum --wind 15                   the sea a wind of 15 m/s raises
   littoral waves spectrum --buoy 41010.data_spec      what a buoy measured
-  littoral waves dispersion --period 8 --depth 5      how long and fast an 8 s wave is in 5 m")]
+  littoral waves dispersion --period 8 --depth 5      how long and fast an 8 s wave is in 5 m
+  littoral waves height --sea wind=15 --at 0,0        how high that sea stands, and how it runs")]
 pub struct Waves {
     #[command(subcommand)]
     command: Command,
@@ -23,6 +25,7 @@ pub struct Waves {
 enum Command {
     Spectrum(Box<spectrum::Spectrum>),
     Dispersion(dispersion::Dispersion),
+    Height(Box<height::Height>),
 }
 
 impl Waves {
@@ -31,6 +34,7 @@ impl Waves {
         match self.command {
             Command::Spectrum(command) => command.run(talk),
             Command::Dispersion(command) => command.run(talk),
+            Command::Height(command) => command.run(talk),
         }
     }
 }
