@@ -57,7 +57,7 @@ fn beach(folder: &Path, name: &str, rise: f32) -> String {
 }
 
 /// The channels of an EXR by name.
-fn channels(file: &Path) -> impl Fn(&str) -> Vec<f32> {
+fn channels(file: &Path) -> impl Fn(&str) -> Vec<f32> + use<> {
     let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
     let channels = image.from_file(file).expect("an EXR").layer_data.channel_data;
     move |name: &str| {
@@ -239,4 +239,123 @@ fn nonsense_is_refused_and_named() {
     height(&["--sea", "wind=9", "--at", "0,0", "--below", "-1"], "a depth from 0");
     fails(&["waves", "height", "--sea", "wind=9", "--at", "1e300,0"], 1, "within 1e9 m");
     fails(&["waves", "height", "--land", "none.tif", "--sea", "wind=9", "--at", "0,0"], 1, "none of that name");
+}
+
+/// Samples of a PNG as whole numbers, and how many a pixel has.
+fn png_of(file: &Path) -> (usize, Vec<u16>, usize) {
+    let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(file).expect("a picture")))
+        .read_info()
+        .expect("a PNG");
+    let mut bytes = vec![0; reader.output_buffer_size().expect("small")];
+    let info = reader.next_frame(&mut bytes).expect("pixels");
+    let values = match info.bit_depth {
+        png::BitDepth::Sixteen => bytes.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect(),
+        _ => bytes.iter().map(|b| u16::from(*b)).collect(),
+    };
+    (info.width as usize, values, info.color_type.samples())
+}
+
+#[test]
+fn exported_tiles_say_how_they_are_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let path = |name: &str| at(name).display().to_string();
+    let sea = ["waves", "export", "--sea", "wind=14,from=190,seed=2", "--size", "128", "--tile", "200", "--time", "20"];
+    let floats = json(&[&sea[..], &["--out", &path("a.exr")]].concat());
+    let pictures = json(&[&sea[..], &["--out", &path("a.png")]].concat());
+    assert!(floats["range"].is_null() && floats["sample"].as_f64() == Some(200.0 / 128.0));
+    assert_eq!(pictures["files"].as_array().map(Vec::len), Some(3));
+    let range = pictures["range"].as_f64().expect("a range");
+    let channel = channels(&at("a.exr"));
+    let (side, codes, parts) = png_of(&at("a_displacement.png"));
+    assert_eq!((side, parts, codes.len()), (128, 3, 128 * 128 * 3));
+    let mut most = 0f64;
+    for (part, name) in ["displacement.X", "displacement.Y", "displacement.Z"].into_iter().enumerate() {
+        for (i, metres) in channel(name).into_iter().enumerate() {
+            let read = (2.0 * f64::from(codes[3 * i + part]) / 65_535.0 - 1.0) * range;
+            assert!((read - f64::from(metres)).abs() <= 1.01 * range / 65_535.0, "{name} {i}: {read} for {metres}");
+            most = most.max(f64::from(metres).abs());
+        }
+    }
+    assert!(most <= range && most > 0.95 * range, "range {range} for {most}");
+    let (_, codes, _) = png_of(&at("a_normal.png"));
+    for (part, name) in ["normal.X", "normal.Y", "normal.Z"].into_iter().enumerate() {
+        let off = |(i, n): (usize, f32)| (2.0 * f32::from(codes[3 * i + part]) / 255.0 - 1.0 - n).abs();
+        assert!(channel(name).into_iter().enumerate().map(off).fold(0.0, f32::max) < 0.0041, "{name}");
+    }
+    let (_, codes, parts) = png_of(&at("a_foam.png"));
+    let foam = channel("foam.V");
+    assert!(parts == 1 && codes.iter().zip(&foam).all(|(c, f)| (f32::from(*c) - f * 255.0).abs() < 0.51));
+    assert!(codes.iter().any(|c| *c > 100), "a gale without foam");
+    // One thing alone has plain channels; all of the sea is that of the words.
+    json(&[&sea[..], &["--what", "normal", "--out", &path("n.exr")]].concat());
+    assert_eq!(channels(&at("n.exr"))("G"), channel("normal.Y"));
+    let tile_hs = pictures["tile_hs"].as_f64().expect("a height");
+    assert!(tile_hs > 0.9 * pictures["hs"].as_f64().expect("a height"), "{tile_hs}");
+}
+
+#[test]
+fn exported_loops_close() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let export = |time: &str, name: &str, more: &[&str]| {
+        let sea = ["waves", "export", "--sea", "wind=14", "--size", "64", "--tile", "100", "--loop", "6", "--fps", "2"];
+        json(&[&sea[..], &["--time", time, "--out", &at(name).display().to_string()], more].concat())
+    };
+    let answer = export("0", "one", &[]);
+    assert_eq!((answer["frames"].as_u64(), answer["files"].as_array().map(Vec::len)), (Some(12), Some(36)));
+    export("6", "two", &[]);
+    export("3", "half", &[]);
+    let bytes = |folder: &str, name: &str| std::fs::read(at(folder).join(name)).expect("written");
+    for what in ["displacement", "normal", "foam"] {
+        for frame in 1..=12 {
+            let name = format!("{what}_{frame:05}.png");
+            // A loop later everything is as it was; half a loop later so are the frames half a loop before.
+            assert!(
+                bytes("one", &name).iter().zip(bytes("two", &name)).filter(|(a, b)| **a != *b).count() == 0,
+                "{name}"
+            );
+            let later = format!("{what}_{:05}.png", (frame + 5) % 12 + 1);
+            assert_eq!(png_of(&at("half").join(&name)).1, png_of(&at("one").join(&later)).1, "{name}");
+        }
+        let frames = [1, 2].map(|frame| bytes("one", &format!("{what}_{frame:05}.png")));
+        assert_ne!(frames[0], frames[1], "{what} stands still");
+    }
+    let told: Value = serde_json::from_slice(&bytes("one", "tile.json")).expect("JSON");
+    assert_eq!((&told["range"], told["loop"].as_f64(), told["fps"].as_f64()), (&answer["range"], Some(6.0), Some(2.0)));
+    let floats = export("0", "floats", &["--format", "exr", "--what", "foam,displacement"]);
+    assert!(floats["range"].is_null() && at("floats").join("displacement_00012.exr").is_file());
+}
+
+#[test]
+fn exports_that_make_no_sense_are_refused() {
+    let export = |rest: &[&str], words: &str| fails(&[&["waves", "export"], rest].concat(), 2, words);
+    let sea = ["--sea", "wind=9", "--out"];
+    export(&["--sea", "wind=9"], "--out <FILE|FOLDER>");
+    export(&[&sea[..], &["a.tif"]].concat(), "a name ending in .exr or .png, or a folder, got .tif");
+    export(&[&sea[..], &["a.png", "--loop", "8"]].concat(), "expected a folder for the frames of a loop");
+    export(&[&sea[..], &["a.png", "--format", "exr"]].concat(), "expected the ending of --format");
+    export(&[&sea[..], &["a.png", "--size", "100"]].concat(), "a power of two from 64 to 1024");
+    export(&[&sea[..], &["a.png", "--tile", "0"]].concat(), "a length from 0.1 to 1e6 m");
+    export(&[&sea[..], &["a.png", "--choppiness", "nan"]].concat(), "expected a factor from 0 to 2");
+    export(&[&sea[..], &["a", "--loop", "3600", "--fps", "1000"]].concat(), "at most 100000 frames");
+    export(&["--sea", "wind=nan", "--out", "a.png"], "expected m/s, above 0 and at most 120");
+    fails(
+        &["waves", "export", "--sea", "wind=9", "--out", "no/where/a.png"],
+        1,
+        "expected the folder no/where to exist",
+    );
+    // Calm water and tiles of anything from ripples to oceans are exported, and say what they lack.
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("a.png").display().to_string();
+    for (spec, tile, words) in [
+        ("calm", "10", "[]"),
+        ("wind=20", "2", "of the waves' energy"),
+        ("beaufort=1", "1e6", "of the waves' energy"),
+        ("wind=20,depth=0.5", "300", "waves of 7.3 m in 0.5 m of water would have broken"),
+        ("wind=9,depth=6,model=tma", "300", "[]"),
+    ] {
+        let answer = json(&["waves", "export", "--sea", spec, "--tile", tile, "--size", "64", "--out", &out]);
+        assert!(answer["warnings"].to_string().contains(words), "{spec}: {answer}");
+    }
 }
