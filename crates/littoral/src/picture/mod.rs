@@ -23,6 +23,7 @@ mod display;
 mod grain;
 mod ground;
 mod natural;
+mod rim;
 mod sampler;
 mod sea;
 mod shade;
