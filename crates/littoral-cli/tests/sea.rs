@@ -141,6 +141,42 @@ fn the_picture_of_a_file_shows_what_is_asked() {
 }
 
 #[test]
+fn where_the_picture_shows_sand_it_is_dry() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let land = beach(folder.path(), "beach.tif", 0.0);
+    let out = folder.path().join("shore.exr");
+    let sea = ["--sea", "hs=1.2,tp=8,from=270", "--time", "11"];
+    // The waterline lies at X = 785005, where the ground is a centimetre for every four.
+    let eye = ["--eye", "784990,5400400,14", "--look", "785006,5400401,0", "--size", "60x60", "--fov", "50"];
+    let name = out.display().to_string();
+    let fixed = ["--samples", "1", "--passes", "position", "--out", &name];
+    let answer = json(&[&["render", land.as_str()], &sea[..], &eye, &fixed].concat());
+    let eye = numbers(&answer["eye"]);
+    let channel = channels(&out);
+    let [x, y, z] = ["position.X", "position.Y", "position.Z"].map(&channel);
+    let points: String =
+        (0..x.len()).map(|i| format!("{},{}\n", f64::from(x[i]) + eye[0], f64::from(y[i]) + eye[1])).collect();
+    let (heights, _) = asked(&[&["--land", land.as_str()], &sea[..]].concat(), &points);
+    let (mut dry, mut wet, mut apart, mut worst) = (0, 0, 0, 0f64);
+    for i in 0..heights.len() {
+        let ground = -25.0 + 0.025 * (f64::from(x[i]) + eye[0] - 784_005.0);
+        let shown = f64::from(z[i]) + eye[2];
+        let (told, near) = if heights[i].is_nan() { (ground, 0.02) } else { (heights[i], 0.05) };
+        if heights[i].is_nan() {
+            dry += 1
+        } else {
+            wet += 1
+        }
+        apart += usize::from((shown - told).abs() > near);
+        worst = worst.max((shown - told).abs());
+    }
+    assert!(dry > 500 && wet > 500, "{dry} dry, {wet} wet");
+    // A ray that grazes the sand takes thin water up to a decimetre below it for the sea: the very edge of the swash.
+    let share = apart as f64 / heights.len() as f64;
+    assert!(share < 0.1 && worst < 0.2, "{share} of the pixels are apart from what is told, by up to {worst} m");
+}
+
+#[test]
 fn one_point_gives_numbers_and_several_give_lists() {
     let sea = ["waves", "height", "--sea", "wind=12,from=200", "--time", "3"];
     let one = json(&[&sea[..], &["--at", "10,-20"]].concat());

@@ -7,7 +7,7 @@ use crate::points::{self, Typed};
 use crate::subject::Subject;
 use crate::talk::{Failure, Talk, tidy, written};
 use glam::{DVec2, Vec3};
-use littoral::field::{Land, Sea, Surface, coast};
+use littoral::field::{Land, Sea, Surface, Water, coast};
 use littoral::space::Datum;
 use littoral::waves::SeaState;
 use serde::Serialize;
@@ -141,7 +141,22 @@ struct Misses {
 struct Shown {
     sea: Sea,
     land: Option<Subject>,
+    /// Where a swash could get to.
+    beach: Option<Water>,
 }
+
+impl Shown {
+    /// Whether waves may wet a place, as pictures have it: it lies in still water, or on a shore that rises from it.
+    fn may_be_wet(&self, place: DVec2, ground: Option<f64>) -> bool {
+        let Some(land) = &self.land else { return true };
+        let still = land.water.as_ref().is_some_and(|water| water.covers(place));
+        let shore = ground.is_some_and(|ground| ground >= self.sea.level());
+        still || shore && self.beach.as_ref().is_some_and(|beach| beach.covers(place))
+    }
+}
+
+/// No swash is followed higher above still water (m), here as in pictures.
+const HIGHEST_SWASH: f64 = 3.0;
 
 impl Height {
     /// Runs the command.
@@ -207,7 +222,7 @@ impl Height {
             let made = Sea::of_state(datum, 0.0, &state);
             let mut sea = made.map_err(|e| Failure::Usage(format!("--sea: {e}; correct it")))?;
             sea.set_time(self.time);
-            return Ok(Shown { sea, land: None });
+            return Ok(Shown { sea, land: None, beach: None });
         }
         let files: &[PathBuf] = if self.built_in() { &[] } else { &self.land };
         let level = self.water.unwrap_or(0.0);
@@ -218,7 +233,8 @@ impl Height {
                 subject.name
             )));
         };
-        Ok(Shown { sea, land: Some(subject) })
+        let beach = Water::flood(&subject.land, level + HIGHEST_SWASH);
+        Ok(Shown { sea, land: Some(subject), beach })
     }
 
     /// What is known of the water at points.
@@ -244,11 +260,7 @@ impl Height {
         for (i, surface) in surfaces.iter().enumerate() {
             misses.total += 1;
             let ground = shown.land.as_ref().and_then(|land| height_at(&land.land, places[i])).map(f64::from);
-            // As pictures have it.
-            let wet = shown.land.as_ref().is_none_or(|land| {
-                land.water.as_ref().is_some_and(|water| water.covers(places[i]))
-                    && ground.is_none_or(|ground| ground < surface.height)
-            });
+            let wet = shown.may_be_wet(places[i], ground) && ground.is_none_or(|ground| ground < surface.height);
             if !wet {
                 misses.dry(&typed[i].text, ground, surface.height);
                 known.push(None);
