@@ -33,6 +33,7 @@ use std::time::Instant;
   littoral render dem.tif --out linear.exr --passes depth,normal
   littoral render dem.tif --sea wind=14,from=300 --sun 300,8
   littoral render --sea beaufort=8,from=240                the coast in a storm
+  littoral render --sea buoy=41010.data_spec               in the waves that a buoy measured
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
   littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4

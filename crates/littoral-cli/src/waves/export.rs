@@ -43,7 +43,7 @@ An EXR of several has layers (displacement.X, .Y, .Z, normal.X, …, foam.V), of
 A folder gets a file for each (displacement.png, …; in a loop displacement_00001.png onward) and
 tile.json, which says what is printed with --json: range (m), tile (m), size, sample (m), time
 (s), loop, fps, frames, hs (m, of the state) and tile_hs (of the waves in the tile), shortest and
-longest wave (m), wind, from, files, seconds.")]
+longest wave (m), from (where waves come from), wind (m/s), wind_from, files, seconds.")]
 pub struct Export {
     /// The waves, as `littoral render --sea` takes them: wind=15,from=240; hs=2,tp=9; beaufort=6; douglas=4; buoy=FILE; with
     /// swell=HEIGHT@PERIOD/FROM, fetch=KM, model=, gamma=, spread=, depth=, seed=
@@ -162,6 +162,7 @@ struct Answer {
     shortest: f64,
     longest: f64,
     wind: f64,
+    wind_from: f64,
     from: f64,
     choppiness: f64,
     seconds: f64,
@@ -244,7 +245,8 @@ impl Export {
             shortest: TAU / tile.highest,
             longest: tile.length,
             wind: state.wind.speed,
-            from: bearing_from_heading(state.wind.heading),
+            wind_from: bearing_from_heading(state.wind.heading),
+            from: bearing_from_heading(state.mean_heading()),
             choppiness: self.choppiness,
             files,
             seconds: started.elapsed().as_secs_f64(),

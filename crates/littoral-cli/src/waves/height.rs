@@ -75,7 +75,7 @@ pub struct Height {
     /// Use all samples of the land, however many, as `render --full` does; otherwise files of more than 16 million are taken coarser
     #[arg(long, requires = "land", help_heading = "Land")]
     full: bool,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Land")]
     reading: Reading,
 }
 
