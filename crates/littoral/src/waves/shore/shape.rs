@@ -260,31 +260,34 @@ impl Lace {
     pub(super) fn new() -> Lace {
         // Distance to the nearest border between cells of scattered points (S. Worley 1996), bent and of two sizes.
         let side = Lace::SIDE as i64;
-        let cells = |at: (f64, f64), size: i64, seed: u64| {
+        // The points of each size, once; of each there are a power of two along a side.
+        let points = |size: i64, seed: u64| -> (i64, i64, Vec<(f64, f64)>) {
             let count = side / size;
-            let (x, y) = (at.0 / size as f64, at.1 / size as f64);
+            let point = |i: i64| (uniform(seed, i % count, i / count, 0), uniform(seed, i % count, i / count, 1));
+            (size, count, (0..count * count).map(point).collect())
+        };
+        let cells = |at: (f64, f64), (size, count, points): &(i64, i64, Vec<(f64, f64)>)| {
+            let (x, y) = (at.0 / *size as f64, at.1 / *size as f64);
+            let (left, low) = (x.floor(), y.floor());
             let (mut first, mut second) = (f64::INFINITY, f64::INFINITY);
             for j in -2..=2 {
+                let row = ((low as i64 + j) & (count - 1)) * count;
                 for i in -2..=2 {
-                    let (cx, cy) = (x.floor() as i64 + i, y.floor() as i64 + j);
-                    let (kx, ky) = (cx.rem_euclid(count), cy.rem_euclid(count));
-                    let px = cx as f64 + uniform(seed, kx, ky, 0);
-                    let py = cy as f64 + uniform(seed, kx, ky, 1);
-                    let d = sqrt((px - x) * (px - x) + (py - y) * (py - y));
-                    if d < first {
-                        (first, second) = (d, first);
-                    } else {
-                        second = second.min(d);
-                    }
+                    let point = points[(row + ((left as i64 + i) & (count - 1))) as usize];
+                    let (dx, dy) = (left + i as f64 + point.0 - x, low + j as f64 + point.1 - y);
+                    let d = dx * dx + dy * dy;
+                    second = second.min(first.max(d));
+                    first = first.min(d);
                 }
             }
-            (second - first, first)
+            (sqrt(second) - sqrt(first), sqrt(first))
         };
+        let sizes = [points(16, 71), points(8, 72), points(64, 73)];
         let value = |i: i64| {
             let (x, y) = ((i % side) as f64, (i / side) as f64);
             let bend = |n: f64| 3.0 * libm::sin(TAU * n / side as f64 * 5.0);
             let p = (x + bend(y) + 0.4 * bend(1.7 * y), y + bend(x + 40.0));
-            let ((wide, _), (fine, _), (_, patch)) = (cells(p, 16, 71), cells(p, 8, 72), cells(p, 64, 73));
+            let ((wide, _), (fine, _), (_, patch)) = (cells(p, &sizes[0]), cells(p, &sizes[1]), cells(p, &sizes[2]));
             let thread = |d: f64| 1.0 - (d * 2.2).min(1.0);
             (0.45 * thread(wide) + 0.33 * thread(fine) + 0.5 * (1.0 - patch.min(1.0))) as f32
         };
