@@ -7,9 +7,9 @@
 use glam::{DVec2, DVec3, Vec3};
 use littoral::field::Sea;
 use littoral::space::Datum;
-use littoral::waves::cascades::{Cascades, Options};
+use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::shore::{Bed, ShoreSea};
-use littoral::waves::{BLOCK, Motion, Points, SeaState, Velocity, WaveModel, random};
+use littoral::waves::{BLOCK, Motion, Points, SeaState, Superposition, Velocity, WaveModel, random};
 use std::hint::black_box;
 
 const BLOCKS: usize = 4096;
@@ -38,6 +38,7 @@ fn main() {
     }
     if !only_points {
         seas();
+        growth(&state);
     }
 }
 
@@ -138,6 +139,46 @@ fn seas() {
             let worst = surfaces.iter().map(|s| s.residual).fold(0.0, f32::max);
             println!("  {kind}: heights {height:.2} M/s, surfaces {surface:.2} M/s (off by at most {worst:.1e} m), velocities {velocity:.2} µs each");
         }
+    }
+}
+
+/// What a frame of 256 × 256 points a metre apart takes (ms): going to an instant, and everything about the motion there.
+fn growth(state: &SeaState) {
+    let points: Vec<Points> = (0..4096)
+        .map(|i| Points {
+            x: std::array::from_fn(|l| 600.0 + f64::from(i % 16 * 16 + l as i32)),
+            y: [1300.0 + f64::from(i / 16); BLOCK],
+            footprint: [0.0; BLOCK],
+        })
+        .collect();
+    let mut motions = vec![Motion::STILL; 64];
+    let mut frame = |model: &mut dyn WaveModel| {
+        let mut now = 0.0;
+        let step = median(9, || {
+            now += 1.0 / 60.0;
+            model.set_time(now);
+        });
+        let asked = median(9, || {
+            for points in points.chunks(64) {
+                model.add_motions(points, &mut motions);
+                black_box(&mut motions);
+            }
+        });
+        format!("{:.2} + {:.1}", step * 1e3, asked * 1e3)
+    };
+    println!("a frame of 256 × 256 points, ms to go to an instant + ms to ask:");
+    for samples in [128, 256, 512, 1024] {
+        let tile = Tile { length: 600.0, turn: 0.3, samples, lowest: 0.02, highest: 0.5 * 0.0052 * samples as f64 };
+        let mut sea = Cascades::with_tiles(state, &[tile], &Options::default()).expect("a sea");
+        println!("  one tile of {samples}²: {}", frame(&mut sea));
+    }
+    for (frequencies, directions) in [(8, 4), (16, 8), (32, 16)] {
+        let mut sea = Superposition::of_state(state, frequencies, directions).expect("a sea");
+        println!("  {} waves summed: {}", frequencies * directions, frame(&mut sea));
+    }
+    for (columns, rows, count) in [(400, 600, 16), (400, 600, 32), (400, 600, 64), (400, 600, 128), (200, 300, 32), (800, 1200, 32)] {
+        let mut sea = ShoreSea::new(&bed(columns, rows), state, count).expect("a sea");
+        println!("  {count} waves over {columns} × {rows} nodes: {}", frame(&mut sea));
     }
 }
 

@@ -280,15 +280,8 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
         let mut last = Complex::ZERO;
         let mut chain = Complex::ZERO;
         let ends = [0, n - 1].map(|j| {
-            let mut end = Complex::ZERO;
             let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            for l in 0..LANES {
-                let i = -d.mul_add(p[j].0[l], damping);
-                let (re, im) = (v[j].re[l], v[j].im[l]);
-                end.re[l] = bn.mul_add(re, -(i * im));
-                end.im[l] = bn.mul_add(im, i * re);
-            }
-            end
+            weighed(&p[j], &v[j], bn, -d, damping)
         });
         last = if n > 1 { ends[0] } else { last };
         // q⁺ v of the nodes before, here and after: in a loop of its own the compiler would take nodes for lanes, by gathers.
