@@ -25,14 +25,20 @@ fn main() {
             let bed = self::bed(columns, rows);
             let seconds = median(5, || drop(black_box(ShoreSea::new(&bed, &state, count))));
             let nodes = (columns * rows) as f64;
-            println!("  {columns} × {rows}, {count} waves: {:.0}; {:.1}", seconds * 1e3, nodes * count as f64 / seconds * 1e-6);
+            println!(
+                "  {columns} × {rows}, {count} waves: {:.0}; {:.1}",
+                seconds * 1e3,
+                nodes * count as f64 / seconds * 1e-6
+            );
         }
     }
     for count in [32, 64] {
         let mut sea = ShoreSea::new(&bed, &state, count).expect("a sea");
         sea.set_time(123.4);
         println!("{count} waves over 400 × 600 nodes, million points a second:");
-        for (name, points) in [("25 cm", rows(0.25)), ("1 m", rows(1.0)), ("4 m", rows(4.0)), ("random", scattered(1580.0, 2380.0))] {
+        for (name, points) in
+            [("25 cm", rows(0.25)), ("1 m", rows(1.0)), ("4 m", rows(4.0)), ("random", scattered(1580.0, 2380.0))]
+        {
             queries(&sea, name, &points);
         }
     }
@@ -46,7 +52,8 @@ fn main() {
 fn bed(columns: usize, rows: usize) -> Bed {
     let spacing = DVec2::new(1600.0 / columns as f64, 2400.0 / rows as f64);
     Bed::of(DVec2::ZERO, spacing, columns, rows, |p| {
-        let beach = 0.012 * (1900.0 + 150.0 * (p.x * 0.004).sin() - p.y) + 0.4 * (p.x * 0.03).sin() * (p.y * 0.02).cos();
+        let beach =
+            0.012 * (1900.0 + 150.0 * (p.x * 0.004).sin() - p.y) + 0.4 * (p.x * 0.03).sin() * (p.y * 0.02).cos();
         let island = 0.04 * ((p.x - 700.0).hypot(p.y - 1100.0) - 120.0);
         beach.min(island).min(14.0)
     })
@@ -137,7 +144,9 @@ fn seas() {
             let (below, mut velocities) = (at(2.0), vec![Vec3::ZERO; places.len()]);
             let velocity = median(5, || sea.velocities_at(&below, &mut velocities)) / count * 1e6;
             let worst = surfaces.iter().map(|s| s.residual).fold(0.0, f32::max);
-            println!("  {kind}: heights {height:.2} M/s, surfaces {surface:.2} M/s (off by at most {worst:.1e} m), velocities {velocity:.2} µs each");
+            println!(
+                "  {kind}: heights {height:.2} M/s, surfaces {surface:.2} M/s (off by at most {worst:.1e} m), velocities {velocity:.2} µs each"
+            );
         }
     }
 }
@@ -176,7 +185,9 @@ fn growth(state: &SeaState) {
         let mut sea = Superposition::of_state(state, frequencies, directions).expect("a sea");
         println!("  {} waves summed: {}", frequencies * directions, frame(&mut sea));
     }
-    for (columns, rows, count) in [(400, 600, 16), (400, 600, 32), (400, 600, 64), (400, 600, 128), (200, 300, 32), (800, 1200, 32)] {
+    for (columns, rows, count) in
+        [(400, 600, 16), (400, 600, 32), (400, 600, 64), (400, 600, 128), (200, 300, 32), (800, 1200, 32)]
+    {
         let mut sea = ShoreSea::new(&bed(columns, rows), state, count).expect("a sea");
         println!("  {count} waves over {columns} × {rows} nodes: {}", frame(&mut sea));
     }

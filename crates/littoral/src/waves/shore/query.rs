@@ -215,7 +215,8 @@ const FILTERED_DISPLACEMENT: usize = 5;
 fn gather<const N: usize, const FOURS: usize>(sea: &ShoreSea, points: &Points, sums: &mut Sums) {
     let spots = find(sea, points);
     let mut totals = [[0.0f32; BLOCK]; N];
-    if spots.shared && sea.blocks <= MOST {
+    // More sums than these would not stay in registers, which costs more than is spared.
+    if N <= FILTERED_DISPLACEMENT && spots.shared && sea.blocks <= MOST {
         together(sea, &spots, &mut totals, sums);
     } else {
         one_by_one::<N, FOURS>(sea, &spots, &mut totals, sums);
@@ -234,7 +235,7 @@ fn gather<const N: usize, const FOURS: usize>(sea: &ShoreSea, points: &Points, s
     }
 }
 
-/// Sums at points that share a cell: points lie along lanes, and waves follow each other in the order in which [`one_by_one`] adds them up.
+/// Displacements at points that share a cell: points lie along lanes, and waves follow each other in the order in which [`one_by_one`] adds them up.
 #[inline(always)]
 fn together<const N: usize>(sea: &ShoreSea, spots: &Spots, totals: &mut [[f32; BLOCK]; N], sums: &mut Sums) {
     let over = [sea.over.x as f32, sea.over.y as f32];
@@ -266,17 +267,12 @@ fn together<const N: usize>(sea: &ShoreSea, spots: &Spots, totals: &mut [[f32; B
     let ground = place(sea, spots, 0);
     for n in 0..8 {
         let [a, across, up, twist] = [ground[0][n], ground[1][n], ground[2][n], ground[3][n]];
-        let (mut value, mut along_x, mut along_y) = ([0.0f32; BLOCK], [0.0f32; BLOCK], [0.0f32; BLOCK]);
+        let mut value = [0.0f32; BLOCK];
         for l in 0..BLOCK {
             let (u, v) = (spots.u[l], spots.v[l]);
             value[l] = (u * v).mul_add(twist, v.mul_add(up, u.mul_add(across, a)));
-            along_x[l] = v.mul_add(twist, across) * over[0];
-            along_y[l] = u.mul_add(twist, up) * over[1];
         }
         sums.place[n] = value;
-        if N >= 11 {
-            (sums.place_x[n], sums.place_y[n]) = (along_x, along_y);
-        }
     }
 }
 
