@@ -6,7 +6,7 @@ use crate::input::{self, Target, WaterLevel};
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
-use littoral::field::{Land, Sea, Water, coast};
+use littoral::field::{Lakes, Land, Sea, Water, coast};
 use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
 use littoral::space::{Ray, View};
 use littoral::waves::{SeaState, spec::SpecError};
@@ -175,6 +175,8 @@ pub struct Subject {
     pub land: Land,
     /// The water.
     pub water: Option<Water>,
+    /// The lakes.
+    pub lakes: Option<Lakes>,
     /// How coordinates and local metres belong together.
     pub frame: Frame,
     /// What heights are counted from, in words.
@@ -225,6 +227,7 @@ impl Render {
         let drape = self.texture.as_ref().map(|texture| drape(texture, &subject, talk)).transpose()?;
         let scene = Scene {
             drape: drape.as_ref(),
+            lakes: subject.lakes.as_ref(),
             climate: climate(&subject.frame),
             north: subject.frame.north(),
             ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
@@ -413,7 +416,11 @@ impl Render {
             WaterLevel::None => None,
             WaterLevel::At(level) => Water::flood(&land, level * self.exaggeration),
         };
-        Ok(Subject { name, land, water, frame, datum, exaggeration: self.exaggeration })
+        let lakes = match self.water {
+            WaterLevel::None => None,
+            _ => Lakes::find(&land, water.as_ref()),
+        };
+        Ok(Subject { name, land, water, lakes, frame, datum, exaggeration: self.exaggeration })
     }
 
     /// Land at a resolution that fits a picture.

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::noise::Fbm;
-use littoral::field::{Land, Raster, Water, coast};
+use littoral::field::{Land, Raster, Sea, Water, coast};
 use littoral::picture::{
     Border, Display, Drape, Picture, Scene, Settings, Shot, Stage, Style, Texture, coast_shot, compose, overhead,
     render,
@@ -271,4 +271,30 @@ fn golden_island() {
     let shot = compose(&land, Some(&water), UVec2::new(192, 108));
     golden("island", &picture_of(&land, Some(&water), &shot, 8));
     golden("island_tint", &picture_of(&land, Some(&water), &Shot { style: Style::Tint, ..shot }, 8));
+}
+
+#[test]
+fn golden_sea() {
+    let land = coast::coast();
+    let water = Water::flood(&land, 0.0).expect("the sea");
+    let state = "beaufort=8,from=240".parse().expect("a state");
+    let sea = Sea::over(&land, &water, &state, &|_| true).expect("a sea");
+    let shot = coast_shot(UVec2::new(240, 135));
+    let scene = Scene { sea: Some(&sea), ..Scene::for_shot(&land, Some(&water), &shot) };
+    golden("storm", &render(&scene, &shot.view, &quick(8), &|_| {}));
+    // A block of water is cut as its land is: waves end at the side, and beside it is the floor.
+    let land = island(129, 12.0);
+    let water = Water::flood(&land, 0.0).expect("an island");
+    let sea = Sea::over(&land, &water, &"hs=4,tp=11,from=200".parse().expect("a state"), &|_| true).expect("a sea");
+    let view = View::looking_at(DVec3::new(-700.0, -2100.0, 900.0), DVec3::ZERO, 0.7, UVec2::new(192, 108));
+    let scene = Scene { sea: Some(&sea), border: Border::Cut, ..Scene::new(&land, Some(&water)) };
+    let picture = render(&scene, &view, &quick(8), &|_| {});
+    golden("block_of_sea", &picture);
+    let wet = picture.position.iter().zip(&picture.height).filter(|(_, height)| height.is_finite());
+    let half = 0.5 * land.extent() + 1e-2;
+    assert!(wet.clone().all(|(p, _)| (view.eye + Vec3::from(*p).as_dvec3()).truncate().abs().cmple(half).all()));
+    let side = |(p, height): (&[f32; 3], &f32)| (view.eye.y + f64::from(p[1]) + half.y).abs() < 0.1 && *height > -2.0;
+    let edge: Vec<f32> = wet.filter(|w| side(*w)).map(|w| *w.1).collect();
+    let (low, high) = edge.iter().fold((0.0f32, 0.0f32), |(low, high), h| (low.min(*h), high.max(*h)));
+    assert!(edge.len() > 20 && high > 0.4, "the upper edge of the side is a wave: {low} to {high}");
 }

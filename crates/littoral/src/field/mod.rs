@@ -6,6 +6,7 @@
 mod blocks;
 pub mod coast;
 mod deviation;
+mod lakes;
 mod land;
 pub mod noise;
 mod pyramid;
@@ -16,6 +17,7 @@ mod windows;
 
 pub(crate) use blocks::{BLOCK_LEVELS, Block};
 pub use deviation::ErrorPyramid;
+pub use lakes::{InLake, Lakes};
 pub use land::Land;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};

@@ -46,8 +46,10 @@ const SHORTEST: f32 = 0.125;
 pub struct Finest {
     /// Variance of their slopes in each direction.
     pub variance: f32,
-    /// Where they run to (rad, counter-clockwise from x).
+    /// Where the wind blows them to (rad, counter-clockwise from x).
     pub heading: f64,
+    /// Its speed 10 m above the sea (m/s).
+    pub wind: f64,
 }
 
 impl std::fmt::Debug for Sea {
@@ -225,6 +227,11 @@ impl Sea {
                 *surface = self.surface(&found, lane);
             }
         });
+    }
+
+    /// How high (m) above still water its waves run up a beach at a place (m), at most: 0 away from shores.
+    pub fn run_up(&self, at: DVec2) -> f32 {
+        self.models.iter().map(|m| m.run_up(at)).fold(0.0, f32::max)
     }
 
     /// Velocities (m/s) of the water at many points (m), at its surface or below it; points above it have that of the surface below

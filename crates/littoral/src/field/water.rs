@@ -63,7 +63,7 @@ impl Water {
             runs
         };
         let runs: Vec<Vec<Range<usize>>> = (0..rows).into_par_iter().map(runs_of).collect();
-        let mut trees = Trees(vec![0]);
+        let mut trees = Trees::of(1);
         let mut open = [false; 4];
         let mut above = 1;
         for (row, here) in runs.iter().enumerate() {
@@ -150,10 +150,19 @@ impl Water {
 }
 
 /// Things that belong together, each with one that stands for it, at the end with the least of all.
-struct Trees(Vec<usize>);
+pub(super) struct Trees(Vec<usize>);
 
 impl Trees {
-    fn root(&mut self, mut thing: usize) -> usize {
+    /// So many things, each alone.
+    pub(super) fn of(count: usize) -> Trees {
+        Trees((0..count).collect())
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub(super) fn root(&mut self, mut thing: usize) -> usize {
         while self.0[thing] != thing {
             self.0[thing] = self.0[self.0[thing]];
             thing = self.0[thing];
@@ -161,7 +170,7 @@ impl Trees {
         thing
     }
 
-    fn join(&mut self, a: usize, b: usize) {
+    pub(super) fn join(&mut self, a: usize, b: usize) {
         let (a, b) = (self.root(a), self.root(b));
         self.0[a.max(b)] = a.min(b);
     }

@@ -48,8 +48,9 @@ impl Block {
         Block { low: land.origin(), high: land.origin() + land.extent(), floor: low - thickness, thickness }
     }
 
-    /// Where a ray from beyond the sides crosses into the block's column of space: the distance, and the side's normal.
-    fn entry(&self, eye: DVec3, direction: DVec3) -> Option<(f64, Vec3)> {
+    /// Where a ray crosses into the block's column of space and out of it: two distances, of which the first is negative for a ray that begins
+    /// within, and the normal of the side by which it comes in.
+    pub fn span(&self, eye: DVec3, direction: DVec3) -> Option<(f64, f64, Vec3)> {
         let (at, along) = (eye.truncate(), direction.truncate());
         let (a, b) = ((self.low - at) / along, (self.high - at) / along);
         let (near, far) = (a.min(b), a.max(b));
@@ -65,23 +66,23 @@ impl Block {
         let (enter, leave) = (x.0.max(y.0), x.1.min(y.1));
         let mut normal = Vec3::ZERO;
         normal[axis] = -along[axis].signum() as f32;
-        (enter > 0.0 && enter <= leave).then_some((enter, normal))
+        (leave > 0.0 && enter <= leave).then_some((enter, leave, normal))
     }
 
-    /// The cut that a ray meets, before any ground. `water` is the level of the water at a place, if any.
-    pub fn wall(
-        &self,
-        land: &Land,
-        eye: DVec3,
-        direction: DVec3,
-        water: &dyn Fn(DVec2) -> Option<f64>,
-    ) -> Option<Wall> {
-        let (distance, normal) = self.entry(eye, direction)?;
+    /// Whether a place (m) lies within the sides.
+    pub fn holds(&self, at: DVec2) -> bool {
+        at.cmpge(self.low).all() && at.cmple(self.high).all()
+    }
+
+    /// The cut that a ray from outside meets, before any ground. `water` tells whether a point above the ground lies in water.
+    pub fn wall(&self, land: &Land, eye: DVec3, direction: DVec3, water: &dyn Fn(DVec3) -> bool) -> Option<Wall> {
+        let (distance, _, normal) = self.span(eye, direction).filter(|(enter, ..)| *enter > 0.0)?;
         let position = eye + direction * distance;
         let at = position.truncate().clamp(self.low, self.high);
         let ground = f64::from(land.height_at(at)?);
-        let top = ground.max(water(at).unwrap_or(f64::NEG_INFINITY));
-        (position.z > self.floor && position.z <= top).then(|| Wall { position: at.extend(position.z), normal, ground })
+        let position = at.extend(position.z);
+        let solid = position.z > self.floor && (position.z <= ground || water(position));
+        solid.then_some(Wall { position, normal, ground })
     }
 
     /// Where a ray meets the floor, if nothing is in the way.
@@ -92,9 +93,17 @@ impl Block {
 }
 
 impl Stage<'_> {
-    /// Level of the water at a place within the block, if any.
-    pub(super) fn level_within(&self, at: DVec2) -> Option<f64> {
-        self.scene.water.filter(|w| !self.is_map() && w.covers(at)).map(|w| w.level)
+    /// Whether a point within the block and above the ground lies in the water, waves and all.
+    pub(super) fn is_in_water(&self, lens: &Lens, at: DVec3) -> bool {
+        self.scene.water.filter(|_| !self.is_map() && self.may_be_wet(at.truncate())).is_some_and(|water| {
+            match lens.sea {
+                // Above or below all waves there is no need to ask for them.
+                Some(sea) if (at.z - water.level).abs() < f64::from(sea.bounds().height) => {
+                    at.z <= sea.height_at(at.truncate())
+                }
+                _ => at.z <= water.level,
+            }
+        })
     }
 
     /// The cut.
@@ -102,7 +111,8 @@ impl Stage<'_> {
         let at = wall.position.truncate();
         let sky = irradiance(&self.skylight.open, wall.normal);
         let facing = wall.normal.dot(self.sun).max(0.0);
-        let level = self.level_within(at).filter(|_| wall.position.z > wall.ground);
+        let water = self.scene.water.filter(|_| wall.position.z > wall.ground);
+        let level = water.map(|w| lens.sea.map_or(w.level, |sea| sea.height_at(at)));
         let mut shaded = Shaded::default();
         shaded.light = match level {
             Some(level) => {
@@ -146,7 +156,7 @@ impl Stage<'_> {
         let mut shaded = Shaded { light: albedo / PI * sky, ..Shaded::default() };
         if self.sun.z > 0.0 {
             let towards = to_sun.as_dvec3();
-            let wall = block.wall(&self.ground.land, position, towards, &|at| self.level_within(at));
+            let wall = block.wall(&self.ground.land, position, towards, &|at| self.is_in_water(lens, at));
             if wall.is_none() {
                 shaded.sunlit = albedo / PI * self.air.sunlight(0.0) * self.sun.z;
                 let distance = (position - lens.eye).as_vec3();
@@ -175,7 +185,7 @@ mod tests {
         let land = Land::at(Raster::new(5, 3, DVec2::splat(10.0), heights).expect("valid"), DVec2::new(100.0, 200.0));
         let block = Block::of(&land);
         assert!(block.floor < -1.0);
-        let dry = |_: DVec2| None;
+        let dry = |_: DVec3| false;
         let wall = |eye, to: DVec3| block.wall(&land, eye, (to - eye).normalize(), &dry);
         let east = DVec3::new(300.0, 210.0, 30.0);
         let hit = wall(east, DVec3::new(140.0, 212.0, 39.0)).expect("below the edge");
@@ -188,7 +198,7 @@ mod tests {
         assert!(wall(DVec3::new(125.0, 0.0, 10.0), DVec3::new(125.0, 200.0, 26.0)).is_none());
         assert!(wall(DVec3::new(120.0, 210.0, 90.0), DVec3::new(300.0, 210.0, 0.0)).is_none(), "from within");
         // Water fills the low end up to its level.
-        let wet = |_: DVec2| Some(18.0);
+        let wet = |at: DVec3| at.z <= 18.0;
         let west = DVec3::new(0.0, 210.0, 10.0);
         assert!(block.wall(&land, west, DVec3::X, &wet).is_some_and(|w| w.ground == 0.0));
         assert!(block.wall(&land, west, DVec3::X, &dry).is_none());

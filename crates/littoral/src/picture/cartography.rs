@@ -117,6 +117,11 @@ fn hsl(hue: f32, saturation: f32, lightness: f32) -> Vec3 {
     Vec3::new(channel(0.0), channel(8.0), channel(4.0))
 }
 
+/// Reflectance (linear) of lakes on a tinted map.
+pub const LAKE_TINT: Vec3 = Vec3::new(0.33, 0.56, 0.72);
+/// Reflectance (linear) of lakes on a shaded relief.
+pub const LAKE_PAPER: Vec3 = Vec3::new(0.52, 0.69, 0.80);
+
 /// Reflectance (linear) of a shaded relief at a place, for a pixel of this footprint (m). `to_sun` is the main light's
 /// direction on the map.
 pub fn relief(ground: &Ground, tints: &Tints, at: DVec2, height: f32, footprint: f32, to_sun: Vec2, wet: bool) -> Vec3 {

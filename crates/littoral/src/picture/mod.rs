@@ -23,6 +23,7 @@ mod display;
 mod grain;
 mod ground;
 mod natural;
+mod rim;
 mod sampler;
 mod sea;
 mod shade;
@@ -38,7 +39,7 @@ pub use display::{Display, Exposure, Medium, Picture};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
 
-use crate::field::{Land, Sea, Water};
+use crate::field::{Lakes, Land, Sea, Water};
 use crate::space::View;
 use glam::DVec3;
 
@@ -49,6 +50,8 @@ pub struct Scene<'a> {
     pub land: &'a Land,
     /// Where water lies over it, if any does.
     pub water: Option<&'a Water>,
+    /// The lakes inland, which lie at levels of their own.
+    pub lakes: Option<&'a Lakes>,
     /// The waves on that water, of which the level is the same; without them there is a light air over still water.
     pub sea: Option<&'a Sea>,
     /// The sun.
@@ -74,6 +77,7 @@ impl<'a> Scene<'a> {
         Scene {
             land,
             water,
+            lakes: None,
             sea: None,
             sun: Sun::new(240f64.to_radians(), 25f64.to_radians()),
             air: Air::default(),

@@ -51,13 +51,15 @@ pub struct Site {
     pub footprint: f32,
     /// Level of the water nearby (m), if any.
     pub water: Option<f32>,
+    /// How high waves run up here (m).
+    pub run_up: f32,
     /// Height of trees and houses that the samples include (m).
     pub standing: f32,
 }
 
 /// What kind of ground lies at `site` on `surface`, which is `broad`ly so over some tens of metres.
 pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climate) -> Material {
-    let Site { at, spacing, footprint, water, standing } = *site;
+    let Site { at, spacing, footprint, water, run_up, standing } = *site;
     let normal = Vec3::new(-surface.slope.x, -surface.slope.y, 1.0).normalize();
     let steep = surface.slope.length();
     // Wide samples smooth cliffs away: what is left of their slope counts for more.
@@ -170,7 +172,8 @@ pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climat
         albedo = albedo.lerp(tone.lerp(marsh, flat * step(-0.6, 0.0, above)), sand);
         shaded = shaded.lerp(normal, 0.75 * sand).normalize();
         openness = openness + (1.0 - openness) * sand;
-        wet = 1.0 - step(0.05, 0.55, above + 0.12 * middle + 0.04 * fine);
+        let reach = (0.8 * run_up).max(0.3);
+        wet = 1.0 - step(0.2 * reach, 1.8 * reach, above + (0.12 * middle + 0.04 * fine) * (reach / 0.3).sqrt());
         // Water fills the pores: less light comes back, of a deeper colour.
         albedo = albedo.lerp(albedo * (0.30 + 0.45 * albedo), wet * (0.35 + 0.65 * sand.max(rock)));
     }
@@ -178,7 +181,8 @@ pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climat
         let grown =
             step(0.02, 0.48, 0.55 * middle + 0.5 * wide + 0.22 * patch(plain, 14.0, footprint, 12) + 0.2 * fine)
                 * step(-1.2, -4.5, above);
-        albedo = SAND.lerp(COOL_ROCK * 0.6, rock).lerp(SEAGRASS, grown * 0.85) * (1.0 + 0.12 * fine);
+        let soaked = 0.62 + 0.38 * step(0.0, -1.2, above);
+        albedo = (SAND * soaked).lerp(COOL_ROCK * 0.6, rock).lerp(SEAGRASS, grown * 0.85) * (1.0 + 0.12 * fine);
         wet = 0.0;
     }
 

@@ -184,27 +184,59 @@ fn quantile(share: f32) -> f32 {
     if p < 0.5 { -x } else { x }
 }
 
-/// How much of a pixel of a footprint (m) is white where `cover` of the water about it is foam: a lace of strands and holes, carried by the water
+/// How wind draws foam out into streaks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Streaks {
+    /// Unit vector along the wind.
+    pub along: DVec2,
+    /// How many times longer than wide they are, at least 1.
+    pub stretch: f64,
+}
+
+impl Streaks {
+    /// Those of a wind towards a heading (rad) with a speed (m/s): none in a breeze; in a gale foam "is blown in well-marked streaks along
+    /// the direction of the wind" (the Beaufort scale's words for 8).
+    pub fn of_wind(heading: f64, speed: f64) -> Streaks {
+        Streaks { along: DVec2::from_angle(heading), stretch: 1.0 + 3.5 * (speed / 20.0).clamp(0.0, 1.5).powi(2) }
+    }
+}
+
+/// How much of a pixel of a footprint (m) is white where `cover` of the water about it is foam: a lace of threads and holes, carried by the water
 /// that rests at a place (m). In the mean over places it is `cover`.
-pub fn lace(rest: DVec2, footprint: f32, cover: f32) -> f32 {
+pub fn lace(rest: DVec2, footprint: f32, cover: f32, streaks: Streaks) -> f32 {
     if cover <= 0.002 {
         return 0.0;
     }
-    // Octaves of noise with their wavelengths and shares of the variance; what a pixel cannot show is normally distributed.
-    const OCTAVES: [(f32, f32); 6] = [(5.3, 0.16), (1.9, 0.24), (0.83, 0.24), (0.37, 0.18), (0.16, 0.11), (0.07, 0.07)];
+    // Octaves of noise: wavelengths, shares of the variance, and whether they are threads, being white where the noise is near 0. What a pixel
+    // cannot show is normally distributed.
+    const OCTAVES: [(f32, f32, bool); 7] = [
+        (6.1, 0.20, false),
+        (2.3, 0.14, false),
+        (2.9, 0.18, true),
+        (1.1, 0.18, true),
+        (0.47, 0.14, true),
+        (0.17, 0.09, false),
+        (0.07, 0.07, false),
+    ];
     // Mean square of the noise.
     const NOISE: f32 = 0.074;
+    // Edges are thin foam.
+    const SOFT: f32 = 0.05;
+    let place = DVec2::new(rest.dot(streaks.along) / streaks.stretch, streaks.along.perp_dot(rest));
     let (mut sum, mut left) = (0.0, 1.0f32);
-    for (i, (wavelength, share)) in OCTAVES.into_iter().enumerate() {
+    for (i, (wavelength, share, thread)) in OCTAVES.into_iter().enumerate() {
         let shown = resolved(wavelength, footprint);
         if shown == 0.0 {
-            break;
+            continue;
         }
-        let turned = DVec2::from_angle(1.1 * i as f64).rotate(rest);
-        sum += patch(turned.extend(0.31), wavelength, footprint, 70 + i as u32) * (share / NOISE).sqrt();
+        let turned = DVec2::from_angle(1.1 * i as f64).rotate(place);
+        let noise = patch(turned.extend(0.31), wavelength, 0.0, 70 + i as u32) / NOISE.sqrt();
+        let score = if thread { quantile(2.0 - 2.0 * below(noise.abs())) } else { noise };
+        sum += score * shown * share.sqrt();
         left -= share * shown * shown;
     }
-    below((sum - quantile(1.0 - cover)) / left.max(0.006).sqrt())
+    let soft = left.max(SOFT);
+    below((sum * ((1.0 - soft) / (1.0 - left).max(1e-3)).min(1.0).sqrt() - quantile(1.0 - cover)) / soft.sqrt())
 }
 
 /// Share of the normal distribution below x, to 1e-7 (M. Abramowitz and I. Stegun, *Handbook of mathematical functions*, 1964, 26.2.17).
@@ -364,7 +396,8 @@ mod tests {
             for footprint in [0.01, 0.3, 3.0] {
                 let n = 160;
                 let place = |i: i32| DVec2::new(f64::from(i % n) * 0.731, f64::from(i / n) * 0.593);
-                let sum: f32 = (0..n * n).map(|i| lace(place(i), footprint, cover)).sum();
+                let streaks = Streaks::of_wind(0.7, 15.0);
+                let sum: f32 = (0..n * n).map(|i| lace(place(i), footprint, cover, streaks)).sum();
                 let mean = sum / (n * n) as f32;
                 assert!((mean - cover).abs() < 0.015 + 0.06 * cover, "{cover} at {footprint}: {mean}");
             }

@@ -3,16 +3,17 @@
 use super::Style;
 use super::atmosphere::Veil;
 use super::block::Wall;
-use super::cartography::relief;
+use super::cartography::{LAKE_PAPER, LAKE_TINT, relief};
 use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, Site, natural};
 use super::sampler::Pattern;
-use super::sea::{Ripples, fresnel, glitter, lace, refract, ripples};
+use super::sea::{Ripples, Streaks, fresnel, glitter, lace, refract, ripples};
 use super::skylight::irradiance;
-use super::stage::{HIGHEST_EYE, Lens, Stage};
+use super::stage::{HIGHEST_EYE, HIGHEST_SWASH, Lens, Stage};
 use super::tile::FIRST;
 use super::waves::Wet;
+use crate::field::{InLake, Sea};
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -189,6 +190,11 @@ impl Stage<'_> {
         shaded
     }
 
+    /// Whether a place lies in a lake.
+    fn in_lake(&self, at: DVec2) -> bool {
+        self.scene.lakes.is_some_and(|lakes| lakes.at(self.scene.land, at).is_some())
+    }
+
     /// A cartographer's paper: no sun, no air, only tones.
     fn painted(&self, lens: &Lens, direction: Vec3, ahead: &Ahead) -> Shaded {
         let paper = Vec3::new(0.90, 0.89, 0.86);
@@ -199,6 +205,7 @@ impl Stage<'_> {
                 let wet = self.scene.water.is_some_and(|w| w.covers(at));
                 let to_sun = self.sun.truncate().normalize_or(Vec2::new(-0.7, 0.7));
                 let ground = relief(&self.ground, &self.tints, at, position.z as f32, footprint, to_sun, wet);
+                let ground = if self.in_lake(at) { LAKE_PAPER } else { ground };
                 paper.lerp(ground, self.ground.known(at))
             }
             Ahead::Wall(wall) => paper * (0.62 + 0.12 * wall.normal.dot(self.sun).max(0.0)),
@@ -256,7 +263,7 @@ impl Stage<'_> {
         let footprint = self.footprint(lens, distance, cosine);
         let surface = self.ground.surface(at, footprint);
         let smooth = normal_of_slope(surface.slope);
-        let material = self.material(position, &surface, footprint);
+        let material = self.material(lens, position, &surface, footprint);
         let sky = irradiance(&self.skylight.at(at), material.normal) * material.openness;
         let mut skylit = material.albedo / PI * sky;
         if material.wet > 0.0 {
@@ -275,7 +282,7 @@ impl Stage<'_> {
         Facet { smooth, skylit, sunlit }
     }
 
-    fn material(&self, position: DVec3, surface: &Surface, footprint: f32) -> Material {
+    fn material(&self, lens: &Lens, position: DVec3, surface: &Surface, footprint: f32) -> Material {
         let at = position.truncate();
         let spacing = self.ground.spacing();
         let even = |albedo: Vec3| {
@@ -285,7 +292,8 @@ impl Stage<'_> {
         };
         if self.scene.style == Style::Tint {
             let wet = self.scene.water.is_some_and(|w| w.covers(at));
-            let Material { albedo, openness, .. } = even(self.tints.colour(position.z as f32, wet));
+            let tint = if self.in_lake(at) { LAKE_TINT } else { self.tints.colour(position.z as f32, wet) };
+            let Material { albedo, openness, .. } = even(tint);
             let normal = normal_of_slope(surface.slope * self.tints.steepening());
             return Material { albedo, normal, openness, wet: 0.0 };
         }
@@ -300,7 +308,10 @@ impl Stage<'_> {
         let water = self.scene.water.filter(|w| w.covers(at) || position.z < w.level + 15.0);
         let level = water.map(|w| w.level as f32);
         let broad = self.ground.surface(at, (4.0 * spacing).max(footprint));
-        let site = Site { at: position, spacing, footprint, water: level, standing: self.ground.standing(at) };
+        let beach = level.filter(|level| (-1.0..HIGHEST_SWASH as f32).contains(&(position.z as f32 - level)));
+        let run_up = lens.sea.filter(|_| beach.is_some()).map_or(0.0, |sea| sea.run_up(at));
+        let standing = self.ground.standing(at);
+        let site = Site { at: position, spacing, footprint, water: level, run_up, standing };
         natural(&site, surface, &broad, &self.scene.climate)
     }
 
@@ -330,8 +341,11 @@ impl Stage<'_> {
             shaded.sunlit = pool.sunlit * leaves + self.air.sunlight(0.0) * (glitter(eye, self.sun, &ripples) * film);
             shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
         }
-        if let Some(wet) = wet.filter(|w| w.foam > 0.0) {
-            self.froth(&mut shaded, wet, self.footprint(lens, distance, eye.z));
+        let wet = wet.map(|w| Wet { foam: w.foam.max(self.fringe(lens, &pool, w)), ..*w });
+        if let Some(wet) = wet.as_ref().filter(|w| w.foam > 0.0) {
+            let finest = lens.sea.map(Sea::finest).unwrap_or_default();
+            let streaks = Streaks::of_wind(finest.heading, finest.wind);
+            self.froth(&mut shaded, wet, self.footprint(lens, distance, eye.z), streaks);
         }
         if pool.open < 1.0 {
             shaded.light = self.mist.lerp(shaded.light, pool.open);
@@ -341,11 +355,17 @@ impl Stage<'_> {
         shaded
     }
 
+    /// How much of the water's edge is foam: what waves carry with them as they run up a beach.
+    fn fringe(&self, lens: &Lens, pool: &Pool, wet: &Wet) -> f32 {
+        let Some(sea) = lens.sea.filter(|_| pool.depth < 0.25) else { return 0.0 };
+        0.7 * step(0.1, 0.8, sea.run_up(wet.position.truncate())) * (1.0 - step(0.0, 0.25, pool.depth))
+    }
+
     /// Covers water with its foam.
-    fn froth(&self, shaded: &mut Shaded, wet: &Wet, footprint: f32) {
+    fn froth(&self, shaded: &mut Shaded, wet: &Wet, footprint: f32, streaks: Streaks) {
         /// What fresh foam throws back (C. Whitlock, D. Bartlett, E. Gurganus 1982, beyond the blue).
         const WHITE: Vec3 = Vec3::new(0.58, 0.60, 0.62);
-        let white = lace(wet.rest, footprint, wet.foam);
+        let white = lace(wet.rest, footprint, wet.foam, streaks);
         if white <= 0.0 {
             return;
         }
@@ -359,19 +379,8 @@ impl Stage<'_> {
 
     /// How much of what lies at a place beyond the raster is sea, in [0, 1]: as much as of the border next to it.
     fn open_sea(&self, at: DVec2) -> f32 {
-        let (low, high) = (self.scene.land.origin(), self.scene.land.origin() + self.scene.land.extent());
-        let border = at.clamp(low, high);
-        let away = (at - border).length();
-        let Some(water) = self.scene.water.filter(|_| away > 0.0) else { return 1.0 };
-        // The further out, the wider the stretch of border that counts; as far as the land is wide, all of it.
-        let along = (at - border).perp().normalize_or(DVec2::X);
-        let span = 0.25 * away + 2.0 * f64::from(self.ground.spacing());
-        let wet = (-4..=4).filter(|k| {
-            let place = (border + along * (f64::from(*k) * 0.25 * span)).clamp(low, high);
-            let ground = self.scene.land.height_at(place);
-            water.covers(place) && ground.is_some_and(|h| f64::from(h) <= water.level)
-        });
-        step(0.15, 0.85, wet.count() as f32 / 9.0)
+        let beyond = self.rim.as_ref().map(|rim| rim.beyond(at)).filter(|beyond| beyond.away > 0.0);
+        beyond.map_or(1.0, |beyond| step(0.15, 0.85, beyond.wet))
     }
 
     /// The water at a place, as a pixel sees it.
@@ -382,6 +391,9 @@ impl Stage<'_> {
         let ripples = wet.map_or_else(|| ripples(at, footprint), Wet::ripples);
         let raised = wet.map_or(0.0, |_| (position.z + self.drop_at(at) - self.level()) as f32);
         let shown = normal_of_slope(ripples.slope);
+        if let Some(lake) = self.scene.lakes.filter(|_| wet.is_none()).and_then(|l| l.at(self.scene.land, at)) {
+            return self.lake(ripples, &lake);
+        }
         // Into the water, to where the bent ray meets the bed.
         let within = if shown.dot(eye) > 0.02 { refract(direction, shown) } else { refract(direction, Vec3::Z) };
         let down = (-within.z).max(0.3);
@@ -394,10 +406,15 @@ impl Stage<'_> {
         }
         let sun_within = -refract(-self.sun, Vec3::Z);
         let bed = if depth < 45.0 {
-            let surface = self.ground.surface(below, footprint);
-            let material = self.material(below.extend(position.z - f64::from(depth)), &surface, footprint);
+            // Beyond the border the bed goes on as that is, the farther out the smoother.
+            let (low, high) = (self.scene.land.origin(), self.scene.land.origin() + self.scene.land.extent());
+            let inside = below.clamp(low, high);
+            let away = below.distance(inside) as f32;
+            let surface = self.ground.surface(inside, footprint.max(0.6 * away));
+            let material = self.material(lens, below.extend(self.level() - f64::from(depth)), &surface, footprint);
             let facing = (material.normal.dot(sun_within) / sun_within.z.max(0.2)).clamp(0.3, 1.5);
-            Vec3::splat(0.1).lerp(material.albedo * facing, self.ground.known(below))
+            let known = if away > 0.0 { 1.0 } else { self.ground.known(below) };
+            Vec3::splat(0.1).lerp(material.albedo * facing, known)
         } else {
             Vec3::splat(0.1)
         };
@@ -412,19 +429,36 @@ impl Stage<'_> {
         }
     }
 
+    /// The water of a lake, of which only the surface is known: a bed of mud that falls off from the shore.
+    fn lake(&self, ripples: Ripples, lake: &InLake) -> Pool {
+        const MUD: Vec3 = Vec3::new(0.09, 0.08, 0.055);
+        let depth = (0.07 * lake.to_shore).min(30.0);
+        let down = (-refract(-self.sun, Vec3::Z)).z.max(0.5);
+        let up = |irradiance: Vec3| self.depths.radiance(depth, down, 0.8, irradiance, MUD);
+        let sun = self.sun.z.max(0.0);
+        Pool {
+            ripples,
+            depth,
+            open: 1.0,
+            skylit: up(irradiance(&self.skylight.open, Vec3::Z) * 0.93),
+            sunlit: up(self.air.sunlight(lake.level as f32) * (sun * (1.0 - fresnel(sun)))),
+        }
+    }
+
     /// Height of still water (m).
     fn level(&self) -> f64 {
         self.scene.water.map_or(0.0, |w| w.level)
     }
 
-    /// Depth of the water at a world position (m). Beyond the raster the bed sinks on.
+    /// Depth of still water at a world position (m), negative where the ground is higher. Beyond the raster the bed sinks on.
     fn depth(&self, at: DVec2) -> f32 {
-        let Some(water) = self.scene.water else { return 0.0 };
-        let land = &self.ground.land;
-        let inside = at.clamp(land.origin(), land.origin() + land.extent());
-        let bed = land.height_at(inside).unwrap_or(f32::NEG_INFINITY);
-        let beyond = (at - inside).length() as f32;
-        (water.level as f32 - bed + 0.03 * beyond).clamp(0.0, 1e4)
+        let (Some(water), Some(rim)) = (self.scene.water, &self.rim) else { return 0.0 };
+        let beyond = rim.beyond(at);
+        if beyond.away > 0.0 {
+            return beyond.depth + 0.03 * beyond.away as f32;
+        }
+        let bed = self.ground.land.height_at(at).unwrap_or(f32::NEG_INFINITY);
+        (water.level as f32 - bed).min(1e4)
     }
 
     /// What water mirrors along a ray that meets the ground at `distance` (m): sky, or the land as it looks from afar.
@@ -437,7 +471,7 @@ impl Stage<'_> {
         let known = self.ground.known(at);
         let spacing = self.ground.spacing();
         let surface = self.ground.surface(at, 2.0 * spacing);
-        let material = self.material(position, &surface, 2.0 * spacing);
+        let material = self.material(lens, position, &surface, 2.0 * spacing);
         let sun =
             self.air.sunlight(position.z as f32) * (material.normal.dot(self.sun).max(0.0) * self.skylight.sunny(at));
         let sky = irradiance(&self.skylight.at(at), material.normal) * material.openness;

@@ -4,18 +4,20 @@ use super::atmosphere::{Atmosphere, EARTH, Sky};
 use super::block::{MIST, Wall};
 use super::cartography::Tints;
 use super::ground::Ground;
+use super::rim::Rim;
 use super::sampler::Patterns;
 use super::sea::Depths;
 use super::shade::Ahead;
 use super::skylight::{Skylight, irradiance};
 use super::tile::{Mosaic, Pixel, TILE};
 use super::waves::Wet;
-use super::{Medium, Picture, Scene, Settings, Style};
+use super::{Medium, Picture, Scene, Settings, Style, Water};
 use crate::field::Sea;
 use crate::raycast::{LocalRay, RayCaster};
 use crate::space::View;
-use glam::{DVec3, UVec2, Vec3};
+use glam::{DVec2, DVec3, UVec2, Vec3};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A scene made ready: built once, good for any number of views.
@@ -32,6 +34,10 @@ pub struct Stage<'a> {
     /// Radiance of mist (kcd/m²).
     pub(super) mist: Vec3,
     pub(super) tints: Tints,
+    /// The land's border, where water goes on beyond it.
+    pub(super) rim: Option<Rim>,
+    /// The water as it would stand a little higher, once somebody asks for it: where swash may run.
+    beach: OnceLock<Option<Water>>,
 }
 
 /// Casts many rays whose origins count from the eye. There is one for pictures, and one for tests that shows it right.
@@ -81,7 +87,31 @@ impl<'a> Stage<'a> {
         let open = irradiance(&skylight.open, Vec3::Z);
         let mist = MIST / std::f32::consts::PI * (air.sunlight(middle.max(0.0)) * sun.z.max(0.0) + open);
         let tints = Tints::of(&ground, range, level);
-        Stage { scene: *scene, tints, ground, air, sky, skylight, depths: Depths::new(), sun, mist }
+        let rim = scene.water.map(|water| Rim::new(scene.land, &ground.land, water));
+        Stage {
+            scene: *scene,
+            tints,
+            ground,
+            air,
+            sky,
+            skylight,
+            depths: Depths::new(),
+            sun,
+            mist,
+            rim,
+            beach: OnceLock::new(),
+        }
+    }
+
+    /// Whether waves may wet a place within the raster or beyond: it lies in still water, or on a shore that rises from it.
+    pub(super) fn may_be_wet(&self, at: DVec2) -> bool {
+        let Some(water) = self.scene.water else { return false };
+        water.covers(at) || {
+            let land = self.scene.land;
+            let beach = self.beach.get_or_init(|| Water::flood(land, water.level + HIGHEST_SWASH));
+            let ground = || land.height_at(at).map_or(f64::NEG_INFINITY, f64::from);
+            beach.as_ref().is_some_and(|beach| beach.covers(at)) && ground() >= water.level
+        }
     }
 
     /// Whether the style is that of a map, on which water is a colour.
@@ -169,8 +199,8 @@ impl<'a> Stage<'a> {
         let direction = direction.as_dvec3();
         let ground = f64::from(ground);
         if let Some(block) = &self.ground.block {
-            let level = |at| self.level_within(at);
-            if let Some(wall) = block.wall(&self.ground.land, eye, direction, &level) {
+            let wet = |at| self.is_in_water(lens, at);
+            if let Some(wall) = block.wall(&self.ground.land, eye, direction, &wet) {
                 return Ahead::Wall(wall);
             }
         }
@@ -212,7 +242,11 @@ impl<'a> Stage<'a> {
                 }
                 return Ahead::Wall(Wall { position, normal: self.ground.outward(at), ground: position.z });
             }
-            return Ahead::Ground { position };
+            // The ground of a lake, as it was measured, is its surface.
+            return match self.scene.lakes.filter(|_| !self.is_map()).and_then(|lakes| lakes.at(self.scene.land, at)) {
+                Some(lake) => Ahead::Water { position: at.extend(lake.level), wet: None },
+                None => Ahead::Ground { position },
+            };
         }
         if let Some(block) = &self.ground.block {
             return block.floor(eye, direction).map_or(Ahead::Sky, |position| Ahead::Floor { position });
@@ -224,6 +258,9 @@ impl<'a> Stage<'a> {
         }
     }
 }
+
+/// How high above still water swash is followed (m).
+pub(super) const HIGHEST_SWASH: f64 = 3.0;
 
 /// The greatest height for which the air's tables are made (m); from higher up, the way to the air adds nothing.
 pub(super) const HIGHEST_EYE: f64 = 60_000.0;

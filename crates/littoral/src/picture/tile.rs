@@ -12,7 +12,7 @@ use super::stage::{Lens, Stage};
 use super::waves::Wet;
 use crate::raycast::LocalRay;
 use crate::space::View;
-use glam::{DVec3, UVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use std::ops::Range;
 
 /// Side of a tile (pixels).
@@ -166,11 +166,12 @@ impl Stage<'_> {
             let sample = &mut shaded[k];
             sample.light += mirrored * sample.mirror_share;
         }
-        // A spark brighter than this would speckle its surroundings.
-        let brightest = Vec3::splat(self.mist.max_element().max(1.0) * 30.0);
+        // A spark brighter than this would speckle its surroundings; it keeps its colour.
+        let brightest = self.mist.max_element().max(1.0) * 30.0;
         for (samples, &i) in shaded.chunks_exact(per_pixel).zip(pixels) {
             for sample in samples {
-                sums[i].add((sample.light * sample.through + sample.veil).min(brightest), sample.sky);
+                let light = sample.light * sample.through + sample.veil;
+                sums[i].add(light * (brightest / light.max_element()).min(1.0), sample.sky);
             }
         }
     }
@@ -185,13 +186,14 @@ impl Stage<'_> {
         share: usize,
         per_pixel: usize,
     ) -> Vec<Option<Wet>> {
-        let (Some(sea), Some(water)) = (lens.sea, self.scene.water) else { return Vec::new() };
+        let Some(sea) = lens.sea else { return Vec::new() };
         let mut wet = vec![None; rays.len()];
+        let there = |at: DVec2| self.may_be_wet(at) && self.ground.block.is_none_or(|block| block.holds(at));
         let trace = |wanted: &[usize], wet: &mut [Option<Wet>]| {
             let rays: Vec<LocalRay> = wanted.iter().map(|&k| rays[k]).collect();
             let grounds: Vec<f32> = wanted.iter().map(|&k| distances[k]).collect();
             for (&k, found) in wanted.iter().zip(self.wet(lens, sea, &rays, &grounds)) {
-                wet[k] = found.filter(|w| water.covers(w.position.truncate()));
+                wet[k] = found.filter(|w| there(w.position.truncate()));
             }
         };
         let lender = |k: usize| k - (k % per_pixel) % share;
@@ -201,6 +203,7 @@ impl Stage<'_> {
         let (lent, alone): (Vec<usize>, Vec<usize>) = others.into_iter().partition(|&k| wet[lender(k)].is_some());
         for k in lent {
             wet[k] = wet[lender(k)].and_then(|w| w.lent(lens.eye, &rays[k], distances[k]));
+            wet[k] = wet[k].filter(|w| there(w.position.truncate()));
         }
         trace(&alone, &mut wet);
         wet

@@ -100,8 +100,16 @@ impl Stage<'_> {
             let rise = origin(&rays[i]).z - sea.level();
             // From within the slab at once, from above where it begins.
             let walking = rise <= reach || direction.z < 0.0;
-            let at = if rise > reach && walking { (rise - reach) / -direction.z } else { 0.0 };
-            let end = f64::from(grounds[i]) * (1.0 + 1e-7);
+            let mut at = if rise > reach && walking { (rise - reach) / -direction.z } else { 0.0 };
+            let mut end = f64::from(grounds[i]) * (1.0 + 1e-7);
+            if let Some(block) = &self.ground.block {
+                // No water beyond the cut.
+                let (enter, leave, _) = block.span(origin(&rays[i]), direction).unwrap_or((0.0, 0.0, Vec3::ZERO));
+                (at, end) = (at.max(enter), end.min(leave));
+                if origin(&rays[i]).z + direction.z * enter < block.floor {
+                    end = 0.0;
+                }
+            }
             Lane {
                 direction,
                 end,

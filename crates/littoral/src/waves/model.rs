@@ -1,5 +1,7 @@
 //! What a model of waves answers.
 
+use glam::DVec2;
+
 /// How many points are asked about at once: as many as fill the widest vector registers.
 pub const BLOCK: usize = 16;
 
@@ -142,4 +144,9 @@ pub trait WaveModel: Send + Sync {
     /// Greatest height and sideways displacement (m) of the waves shorter than `wavelength` (m) at this instant: what an error is to land. Falls
     /// to 0 with the wavelength.
     fn roughness(&self, wavelength: f32) -> f32;
+
+    /// How high (m) above still water its waves run up a beach at a place (m), at most; 0 for models that know of none.
+    fn run_up(&self, _at: DVec2) -> f32 {
+        0.0
+    }
 }

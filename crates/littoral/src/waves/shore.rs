@@ -149,7 +149,6 @@ pub struct ShoreSea {
     /// Mean angular frequency (rad/s).
     frequency: f32,
     breaking: f32,
-    lace: shape::Lace,
     time: f64,
     bounds: Bounds,
     /// Largest amplitude (m) of each component by octaves of its local wavelength.
@@ -228,7 +227,6 @@ impl ShoreSea {
             open: Place::default(),
             frequency: 1.0,
             breaking: BREAKING,
-            lace: shape::Lace::new(),
             time: 0.0,
             bounds: Bounds::default(),
             by_length: Vec::new(),
@@ -350,10 +348,13 @@ impl ShoreSea {
     /// land takes the mean of those around it that have some.
     fn reach_inland(&mut self) {
         const REACH: f64 = 80.0;
+        /// What waves themselves do in there, rather than run up (m): they fall to a fiftieth, from which the swash still tells their phase.
+        const INLAND: f64 = 4.0;
         const NONE: u32 = u32::MAX;
         let (columns, rows, blocks) = (self.columns, self.rows, self.blocks);
         let last = (REACH / self.spacing.min_element()).ceil().clamp(2.0, 40.0) as u32;
-        let fade = libm::exp(-self.spacing.min_element() / (0.4 * REACH)) as f32;
+        let fading = |over: f64| libm::exp(-self.spacing.min_element() / over) as f32;
+        let (fade, drown) = (fading(0.4 * REACH), fading(INLAND));
         let near = &self.scratch.grid.near;
         let rings = &mut self.rings;
         rings.clear();
@@ -361,6 +362,7 @@ impl ShoreSea {
         let mut dry: Vec<usize> = (0..columns * rows).filter(|&i| rings[i] == NONE).collect();
         let mut around = Vec::with_capacity(8);
         for ring in 1..=last {
+            let drown = if f64::from(ring) * self.spacing.min_element() < 4.0 * INLAND { drown } else { 1.0 };
             let reached = |rings: &[u32], i: usize, around: &mut Vec<usize>| {
                 let (c, r) = (i % columns, i / columns);
                 around.clear();
@@ -389,7 +391,7 @@ impl ShoreSea {
                             amplitude += i32::from(record.amplitude[l]);
                         }
                         mean.phase[l] = first.phase[l].wrapping_add((turn / count) as i16);
-                        mean.amplitude[l] = (amplitude / count) as u16;
+                        mean.amplitude[l] = (drown * (amplitude / count) as f32) as u16;
                     }
                     self.records[i * blocks + block] = mean;
                 }
@@ -399,6 +401,7 @@ impl ShoreSea {
                 }
                 // Rollers do not climb the beach, and what swash may reach ends somewhere.
                 place.0[Place::BROKEN] *= 0.7;
+                place.0[Place::HEIGHT] *= drown;
                 place.0[Place::SETUP] *= fade;
                 place.0[Place::SWING] *= fade;
                 self.places[i] = place;
@@ -508,6 +511,16 @@ impl WaveModel for ShoreSea {
 
     fn bounds(&self) -> Bounds {
         self.bounds
+    }
+
+    fn run_up(&self, at: DVec2) -> f32 {
+        let ([c, r], [u, v]) = self.locate(at.x, at.y);
+        let reach = |dc: i64, dr: i64| {
+            let place = self.node(c.saturating_add(dc), r.saturating_add(dr)).map_or(self.open, |i| self.places[i]).0;
+            place[Place::SETUP] + shape::FARTHEST * place[Place::SWING]
+        };
+        let (south, north) = (reach(0, 0) * (1.0 - u) + reach(1, 0) * u, reach(0, 1) * (1.0 - u) + reach(1, 1) * u);
+        south + (north - south) * v
     }
 
     fn roughness(&self, wavelength: f32) -> f32 {

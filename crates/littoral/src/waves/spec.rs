@@ -39,6 +39,9 @@ const KEYS: &str = "wind, from, fetch, model, gamma, hs, tp, spread, swell, dept
 /// Fetch where none is told (m).
 const USUAL_FETCH: f64 = 300e3;
 
+/// Wind (m/s) over waves that need none.
+const BREEZE: f64 = 2.5;
+
 #[derive(Default)]
 struct Fields {
     wind: Option<f64>,
@@ -184,8 +187,7 @@ impl Fields {
             _ => return Ok(SeaState::CALM),
         };
         let mut state = SeaState::CALM;
-        // Without a wind one that would raise such waves is taken.
-        let speed = self.wind.unwrap_or_else(|| (0.13 * super::STANDARD_GRAVITY / spectrum.peak).min(60.0));
+        let speed = self.wind.unwrap_or_else(|| spectrum.raising_wind().clamp(BREEZE, 60.0));
         state.wind = super::Wind { speed, heading };
         state.trains.push(Train::Formula { spectrum, spreading: Spreading::Hasselmann, heading });
         Ok(state)
@@ -228,6 +230,7 @@ mod tests {
         assert!((state.wind.heading.to_degrees() - 30.0).abs() < 1e-9);
         assert!((5.5..6.5).contains(&state.significant_height()), "{}", state.significant_height());
         assert!((read("hs=2,tp=8").significant_height() - 2.0).abs() < 0.01);
+        assert!((8.0..14.0).contains(&read("hs=4,tp=9").wind.speed) && read("hs=1,tp=12").wind.speed < 3.0);
         assert!((read("hs=2,model=pm").significant_height() - 2.0).abs() < 0.01);
         assert!(
             read("calm").trains.is_empty() && read("wind=0").trains.is_empty() && read("beaufort=0").trains.is_empty()

@@ -83,6 +83,12 @@ impl Spectrum {
         exp(5.75 - 1.15 * period / sqrt(height)).clamp(1.0, 5.0)
     }
 
+    /// The wind (m/s, 10 m above the sea) under which a growing sea has this tail and peak: α = 0.033 (f_p U/g)^⅔ (Hasselmann et al. 1973). Swell, lower than
+    /// any sea of its period, has next to none.
+    pub fn raising_wind(&self) -> f64 {
+        G / self.peak * pow(self.alpha / 0.033, 1.5)
+    }
+
     /// The same spectrum in water of a depth (m, above 0): TMA.
     pub fn in_depth(self, depth: f64) -> Spectrum {
         Spectrum { depth, ..self }
@@ -194,6 +200,17 @@ mod tests {
         // T_m01 and T_m02 of a Pierson–Moskowitz sea are 0.7718 and 0.7104 peak periods.
         assert!((sea.mean_period() / sea.peak_period() - 0.7718).abs() < 1e-3);
         assert!((sea.crossing_period() / sea.peak_period() - 0.7104).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_wind_that_raised_a_sea_is_found_again() {
+        for (speed, fetch) in [(5.0, 20e3), (12.0, 100e3), (25.0, 200e3)] {
+            let sea = Spectrum::jonswap(speed, fetch, 3.3).expect("a wind");
+            // The law between tail and peak rounds the two laws of fetch.
+            assert!((sea.raising_wind() / speed - 1.0).abs() < 0.06, "{speed}: {}", sea.raising_wind());
+        }
+        let swell = Spectrum::of_height_and_period(1.0, 14.0, 3.3).expect("a swell");
+        assert!(swell.raising_wind() < 0.1);
     }
 
     #[test]

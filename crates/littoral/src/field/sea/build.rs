@@ -74,7 +74,7 @@ impl Sea {
             libm::pow(TAU, 4.0) / (STANDARD_GRAVITY * STANDARD_GRAVITY) * state.moment(4, low, highest)
         });
         let left = (seen - modelled).max(0.15 * seen);
-        self.finest = Finest { variance: (0.5 * left) as f32, heading: state.wind.heading };
+        self.finest = Finest { variance: (0.5 * left) as f32, heading: state.wind.heading, wind: state.wind.speed };
         self
     }
 }

@@ -206,10 +206,17 @@ fn cell(sea: &ShoreSea, corners: [Option<usize>; 4], [height, slope, curvature]:
     let bend = shape::steepest(r);
     let sideways = greatest(Place::SIDEWAYS);
     let changing = 3.0 * height * (spread(Place::COSINE) + spread(Place::SINE));
+    let least_height = places.iter().map(|p| p.0[Place::HEIGHT]).fold(f32::INFINITY, f32::min);
+    let swing = greatest(Place::SWING);
+    // As high as it is told to run and no steeper than waves that much higher would be.
+    let swash = greatest(Place::SETUP) + shape::FARTHEST * swing;
+    let climbing = spread(Place::SETUP)
+        + shape::FARTHEST * spread(Place::SWING)
+        + swing / (0.7 * least_height + 1e-5) * (slope + spread(Place::HEIGHT));
     let own = Bounds {
-        height: height * shape::highest(r) + 0.25 * greatest(Place::HEIGHT) * r,
+        height: height * shape::highest(r) + 0.25 * greatest(Place::HEIGHT) * r + swash,
         sideways: height * sideways,
-        slope: slope * bend + changing + spread(Place::HEIGHT),
+        slope: slope * bend + changing + spread(Place::HEIGHT) + if swash > 0.0 { climbing } else { 0.0 },
         stretch: slope * sideways + height * spread(Place::SIDEWAYS),
         bend: curvature * sideways + 2.0 * slope * spread(Place::SIDEWAYS),
         curvature: curvature * bend + if r > 1e-3 { 6.0 * r * slope * slope / soft.max(1e-3) } else { 0.0 },

@@ -426,7 +426,7 @@ pub(super) fn displacement(sea: &ShoreSea, points: &Points, motion: &mut Motion)
     add_up::<false>(sea, points, &mut sums);
     for l in 0..LANES {
         let sideways = sums.place[Place::SIDEWAYS][l];
-        motion.dz[l] += shape::profile(&sums, l).0;
+        motion.dz[l] += shape::profile(&sums, l).0 + shape::swash(&sums, l);
         motion.dx[l] -= sideways * sums.side_x[l];
         motion.dy[l] -= sideways * sums.side_y[l];
     }
@@ -443,12 +443,14 @@ pub(super) fn motion(sea: &ShoreSea, points: &Points, motion: &mut Motion) {
         let parts = shape::profile(&sums, l);
         let sideways = sums.place[Place::SIDEWAYS][l];
         let (x, y) = (sums.side_x[l], sums.side_y[l]);
-        motion.dz[l] += parts.0;
+        motion.dz[l] += parts.0 + shape::swash(&sums, l);
         motion.dx[l] -= sideways * x;
         motion.dy[l] -= sideways * y;
         let (east, north) = ((sums.zeta_x[l], sums.xi_x[l]), (sums.zeta_y[l], sums.xi_y[l]));
-        motion.slope_x[l] += shape::profile_slope(&sums, l, parts, east, &sums.place_x);
-        motion.slope_y[l] += shape::profile_slope(&sums, l, parts, north, &sums.place_y);
+        let swashing =
+            (shape::swash_slope(&sums, l, east.0, &sums.place_x), shape::swash_slope(&sums, l, north.0, &sums.place_y));
+        motion.slope_x[l] += shape::profile_slope(&sums, l, parts, east, &sums.place_x) + swashing.0;
+        motion.slope_y[l] += shape::profile_slope(&sums, l, parts, north, &sums.place_y) + swashing.1;
         let (gx, gy) = (sums.place_x[Place::SIDEWAYS][l], sums.place_y[Place::SIDEWAYS][l]);
         motion.dxx[l] -= sideways.mul_add(sums.stretch[0][l], gx * x);
         motion.dxy[l] -= sideways.mul_add(sums.stretch[1][l], 0.5 * gy.mul_add(x, gx * y));
@@ -458,8 +460,7 @@ pub(super) fn motion(sea: &ShoreSea, points: &Points, motion: &mut Motion) {
         motion.hidden_yy[l] += sums.hidden[2][l];
     }
     for l in 0..LANES {
-        let at = (points.x[l], points.y[l]);
-        let foam = sea.lace.foam(&sums, l, sea.frequency, sea.breaking, at, points.footprint[l]);
+        let foam = shape::foam(&sums, l, sea.frequency, sea.breaking);
         motion.foam[l] = motion.foam[l].max(foam);
     }
 }
@@ -525,10 +526,6 @@ pub(super) fn swash(sea: &ShoreSea, points: &Points, levels: &mut [f32; BLOCK]) 
     let mut sums = Sums::NONE;
     add_up::<false>(sea, points, &mut sums);
     for l in 0..LANES {
-        let swing = sums.place[Place::SWING][l];
-        // 2 % of waves are higher than 2.8 √m₀.
-        let usual = (0.7 * sums.place[Place::HEIGHT][l]).max(1e-4);
-        let wave = (sums.zeta[l] / usual).clamp(-1.0, 1.3);
-        levels[l] = swing.mul_add(wave, sums.place[Place::SETUP][l]);
+        levels[l] = shape::swash(&sums, l);
     }
 }

@@ -11,12 +11,11 @@
 //!
 //! *Broken waves.* A wave of height 2E is broken where that is near what the depth bears; their part on the average is J. Battjes and
 //! J. Janssen's of 1978. The front of a broken wave carries a roller; behind it is left a lace of foam that dissolves with the time since the
-//! crest went by, which its phase tells.
+//! crest went by, which its phase tells; told is how much of the water it covers, not its threads and holes.
 //!
 //! *Swash.* H. Stockdon, R. Holman, P. Howd, A. Sallenger 2006: set-up 1.1 · 0.35 β √(H₀L₀) and a swing of 1.1 · ½ √(H₀L₀ (0.563 β² + 0.004))
 //! about it, reached by 2 % of the waves; H₀ is the height that the waves at the place would have in deep water, had none broken.
 
-use super::super::random::uniform;
 use super::lanes::{LANES, angle, decay, smooth};
 use super::solve::quick;
 use libm::{exp, log10, sqrt, tanh};
@@ -249,109 +248,59 @@ pub(super) fn profile_slope(
     (f_d * numerator + f * numerator_d - f * numerator * denominator_d / denominator) / denominator
 }
 
-/// A pattern of threads and holes, as foam leaves them, that repeats itself after [`Lace::SIDE`] nodes.
-pub(super) struct Lace(Vec<f32>);
+/// Greatest swing of the swash in those that 2 % of the waves reach.
+pub(super) const FARTHEST: f32 = 1.3;
+/// The wave (m per m of significant height) that 2 % are higher than: 2.8 √m₀.
+const USUAL: f32 = 0.7;
 
-impl Lace {
-    const SIDE: usize = 256;
-    /// Metres between nodes of the pattern.
-    const SPACING: f64 = 0.24;
+/// How far (m) set-up and swash have raised the water at lane `l`.
+#[inline(always)]
+pub(super) fn swash(sums: &Sums, l: usize) -> f32 {
+    let usual = USUAL.mul_add(sums.place[Place::HEIGHT][l], 1e-5);
+    let (held, _) = held(sums.zeta[l] / usual);
+    sums.place[Place::SWING][l].mul_add(held, sums.place[Place::SETUP][l])
+}
 
-    pub(super) fn new() -> Lace {
-        // Distance to the nearest border between cells of scattered points (S. Worley 1996), bent and of two sizes.
-        let side = Lace::SIDE as i64;
-        // The points of each size, once; of each there are a power of two along a side.
-        let points = |size: i64, seed: u64| -> (i64, i64, Vec<(f64, f64)>) {
-            let count = side / size;
-            let point = |i: i64| (uniform(seed, i % count, i / count, 0), uniform(seed, i % count, i / count, 1));
-            (size, count, (0..count * count).map(point).collect())
-        };
-        let cells = |at: (f64, f64), (size, count, points): &(i64, i64, Vec<(f64, f64)>)| {
-            let (x, y) = (at.0 / *size as f64, at.1 / *size as f64);
-            let (left, low) = (x.floor(), y.floor());
-            let (mut first, mut second) = (f64::INFINITY, f64::INFINITY);
-            for j in -2..=2 {
-                let row = ((low as i64 + j) & (count - 1)) * count;
-                for i in -2..=2 {
-                    let point = points[(row + ((left as i64 + i) & (count - 1))) as usize];
-                    let (dx, dy) = (left + i as f64 + point.0 - x, low + j as f64 + point.1 - y);
-                    let d = dx * dx + dy * dy;
-                    second = second.min(first.max(d));
-                    first = first.min(d);
-                }
-            }
-            (sqrt(second) - sqrt(first), sqrt(first))
-        };
-        let sizes = [points(16, 71), points(8, 72), points(64, 73)];
-        let value = |i: i64| {
-            let (x, y) = ((i % side) as f64, (i / side) as f64);
-            let bend = |n: f64| 3.0 * libm::sin(TAU * n / side as f64 * 5.0);
-            let p = (x + bend(y) + 0.4 * bend(1.7 * y), y + bend(x + 40.0));
-            let ((wide, _), (fine, _), (_, patch)) = (cells(p, &sizes[0]), cells(p, &sizes[1]), cells(p, &sizes[2]));
-            let thread = |d: f64| 1.0 - (d * 2.2).min(1.0);
-            (0.45 * thread(wide) + 0.33 * thread(fine) + 0.5 * (1.0 - patch.min(1.0))) as f32
-        };
-        let mut values: Vec<f32> = (0..side * side).map(value).collect();
-        // Ranked, so that a threshold covers the part of the area that it says.
-        let mut order: Vec<u32> = (0..values.len() as u32).collect();
-        order.sort_by(|a, b| values[*a as usize].total_cmp(&values[*b as usize]).then(a.cmp(b)));
-        let count = values.len() as f32;
-        for (rank, &i) in order.iter().enumerate() {
-            values[i as usize] = rank as f32 / count;
-        }
-        Lace(values)
+/// A wave as the swash follows it, smoothly held between -1 and [`FARTHEST`], and the derivative of that.
+#[inline(always)]
+fn held(wave: f32) -> (f32, f32) {
+    let most = if wave < 0.0 { 1.0 } else { FARTHEST };
+    let t = (wave.abs() / (1.5 * most)).min(1.0);
+    ((most * t * (1.5 - 0.5 * t * t)).copysign(wave), 1.0 - t * t)
+}
+
+/// Slope of [`swash`] along an axis, given the derivatives of ζ and the places.
+#[inline(always)]
+pub(super) fn swash_slope(sums: &Sums, l: usize, zeta_d: f32, place: &[[f32; LANES]; 8]) -> f32 {
+    let usual = USUAL.mul_add(sums.place[Place::HEIGHT][l], 1e-5);
+    let wave = sums.zeta[l] / usual;
+    let (held, share) = held(wave);
+    let wave_d = share * (zeta_d - wave * USUAL * place[Place::HEIGHT][l]) / usual;
+    place[Place::SWING][l].mul_add(held, sums.place[Place::SWING][l].mul_add(wave_d, place[Place::SETUP][l]))
+}
+
+/// Which part of the water about lane `l` is foam.
+pub(super) fn foam(sums: &Sums, l: usize, frequency: f32, breaking: f32) -> f32 {
+    let broken = sums.place[Place::BROKEN][l];
+    if broken < 2e-3 {
+        return 0.0;
     }
-
-    /// Value in [0, 1) at a place (m); every value is equally frequent.
-    fn at(&self, x: f64, y: f64) -> f32 {
-        let (u, v) = (x / Lace::SPACING, y / Lace::SPACING);
-        let (c, r) = (u.floor(), v.floor());
-        let wrap = |n: f64| (n - (n / Lace::SIDE as f64).floor() * Lace::SIDE as f64).max(0.0) as usize % Lace::SIDE;
-        let (c0, r0) = (wrap(c), wrap(r));
-        let (c1, r1) = ((c0 + 1) % Lace::SIDE, (r0 + 1) % Lace::SIDE);
-        let (f, g) = ((u - c) as f32, (v - r) as f32);
-        let at = |c: usize, r: usize| self.0[r * Lace::SIDE + c];
-        let low = at(c0, r0) + f * (at(c1, r0) - at(c0, r0));
-        low + g * (at(c0, r1) + f * (at(c1, r1) - at(c0, r1)) - low)
-    }
-
-    /// Which part of the water at a point is foam.
-    pub(super) fn foam(
-        &self,
-        sums: &Sums,
-        l: usize,
-        frequency: f32,
-        breaking: f32,
-        at: (f64, f64),
-        footprint: f32,
-    ) -> f32 {
-        let broken = sums.place[Place::BROKEN][l];
-        if broken < 2e-3 {
-            return 0.0;
-        }
-        let (zeta, xi) = (sums.zeta[l], sums.xi[l]);
-        let most = breaking * sums.place[Place::DEPTH][l];
-        let e = zeta.mul_add(zeta, xi * xi).sqrt();
-        let often = smooth(2e-3, 0.05, broken);
-        // This wave, against what the depth bears.
-        let here = often * smooth(0.55, 1.0, 2.0 * e / most.max(1e-3));
-        // Time since its crest went by.
-        let behind = -angle(zeta, xi);
-        let age = (if behind < -0.12 { behind + 1.0 } else { behind.max(0.0) }) * std::f32::consts::TAU / frequency;
-        let (cosine, sine) = (zeta / e.max(1e-6), xi / e.max(1e-6));
-        let front = cosine.mul_add(0.88, 0.47 * sine);
-        let roller = here * smooth(0.55, 0.85, front);
-        let period = std::f32::consts::TAU / frequency;
-        // What this wave has left, and what those before it did, on the average.
-        let fresh = 0.85 * here * decay(-age / FADE);
-        let old = 0.8 * often * broken.sqrt() * decay(-(age + period) / (2.0 * FADE));
-        let cover = fresh.max(old).min(0.9);
-        let value = self.at(at.0, at.1);
-        let near = smooth(1.0 - cover - 0.08, 1.0 - cover + 0.08, value);
-        // From afar only how much is covered.
-        let far = smooth(0.3, 1.5, footprint);
-        let lace = near + far * (cover - near);
-        let threads = 0.6 + 0.4 * (value + far * (0.5 - value));
-        (roller * threads.max(smooth(0.75, 0.95, front))).max(lace * 0.9).clamp(0.0, 1.0)
-    }
+    let (zeta, xi) = (sums.zeta[l], sums.xi[l]);
+    let most = breaking * sums.place[Place::DEPTH][l];
+    let e = zeta.mul_add(zeta, xi * xi).sqrt();
+    let often = smooth(2e-3, 0.05, broken);
+    // This wave, against what the depth bears.
+    let here = often * smooth(0.55, 1.0, 2.0 * e / most.max(1e-3));
+    // Time since its crest went by.
+    let behind = -angle(zeta, xi);
+    let age = (if behind < -0.12 { behind + 1.0 } else { behind.max(0.0) }) * std::f32::consts::TAU / frequency;
+    let (cosine, sine) = (zeta / e.max(1e-6), xi / e.max(1e-6));
+    let front = cosine.mul_add(0.88, 0.47 * sine);
+    let roller = here * smooth(0.55, 0.85, front);
+    let period = std::f32::consts::TAU / frequency;
+    // What this wave has left, and what those before it did, on the average.
+    let fresh = 0.85 * here * decay(-age / FADE);
+    let old = 0.8 * often * broken.sqrt() * decay(-(age + period) / (2.0 * FADE));
+    let cover = fresh.max(old).min(0.9);
+    roller.max(cover).clamp(0.0, 1.0)
 }
