@@ -1,7 +1,8 @@
 //! What the sea over a bed answers at points: the kernel over waves.
 //!
 //! A cell's four corners are unpacked once, sixteen waves at a time, into bilinear polynomials of phase and amplitude whose phase includes
-//! the wave of the open sea and the instant; points in the same cell follow at the cost of a sine each wave. A point's answer does not
+//! the wave of the open sea and the instant; points in the same cell follow at the cost of a sine each wave. Sixteen points that share a cell lie along
+//! lanes, others follow each other with waves along lanes; both add up waves in the same order, so that a point's answer does not
 //! depend on which others are asked about with it.
 
 use super::super::fft::kernel::transpose;
