@@ -378,6 +378,10 @@ fn bits_are_the_same_for_any_number_of_threads_and_any_history() {
         let single = Points { footprint: [points.footprint[3]; 16], ..Points::at(points.x[3], points.y[3]) };
         one.add_motion(&single, &mut alone);
         assert_eq!((alone.dz[9], alone.slope_x[9], alone.foam[9]), (a.dz[3], a.slope_x[3], a.foam[3]));
+        // Displacements of points that share a cell are added up in another way.
+        let mut together = Motion::STILL;
+        one.add_displacement(&single, &mut together);
+        assert_eq!((together.dx[9], together.dy[9], together.dz[9]), (a.dx[3], a.dy[3], a.dz[3]));
     }
 }
 

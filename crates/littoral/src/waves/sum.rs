@@ -8,14 +8,13 @@
 
 use super::{BLOCK, Bounds, Motion, OutOfRange, PlaneWave, Points, StillWater, Velocity};
 use glam::DVec2;
-use kernel::{COSINE, SINE};
 use std::f64::consts::TAU;
 
 mod grid;
 mod kernel;
 
 pub use grid::{Grid, GridScratch};
-pub(crate) use kernel::circle;
+pub(crate) use kernel::{COSINE, SINE, circle, small_circle};
 
 /// Most waves in a sum.
 pub(crate) const MOST_WAVES: usize = 1 << 16;

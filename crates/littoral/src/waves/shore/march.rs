@@ -210,6 +210,19 @@ pub(super) fn settle(march: &mut March, waves: &Waves, row: &[Node], share: f32)
     }
 }
 
+/// q⁺ v, where q⁺ is b + i (d p − damping).
+#[inline(always)]
+fn weighed(p: &Lanes, v: &Complex, b: f32, d: f32, damping: f32) -> Complex {
+    let mut to = Complex::ZERO;
+    for l in 0..LANES {
+        let i = d.mul_add(p.0[l], -damping);
+        let (re, im) = (v.re[l], v.im[l]);
+        to.re[l] = b.mul_add(re, -(i * im));
+        to.im[l] = b.mul_add(im, i * re);
+    }
+    to
+}
+
 /// The nearest whole number, for magnitudes below 2²²: its bits stand at the end of the sum's.
 #[inline(always)]
 fn whole_number(x: f32) -> i32 {
@@ -263,38 +276,24 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
     for (a, bn, least) in TERMS {
         let d = 0.5 * a * forward;
         // Right-hand side: p²v + Z (q⁺ v), with Z the second difference and the drift across.
-        // q⁺ v goes into g first.
-        for j in 0..n {
-            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            let (pj, vj) = (p[j], v[j]);
-            let mut to = Complex::ZERO;
-            for l in 0..LANES {
-                let i = d.mul_add(pj.0[l], -damping);
-                let (re, im) = (vj.re[l], vj.im[l]);
-                to.re[l] = bn.mul_add(re, -(i * im));
-                to.im[l] = bn.mul_add(im, i * re);
-            }
-            g[j] = to;
-        }
         // Forward elimination; at the ends are the waves of the open sea, which do not change.
         let mut last = Complex::ZERO;
         let mut chain = Complex::ZERO;
         let ends = [0, n - 1].map(|j| {
-            let mut end = Complex::ZERO;
             let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            for l in 0..LANES {
-                let i = -d.mul_add(p[j].0[l], damping);
-                let (re, im) = (v[j].re[l], v[j].im[l]);
-                end.re[l] = bn.mul_add(re, -(i * im));
-                end.im[l] = bn.mul_add(im, i * re);
-            }
-            end
+            weighed(&p[j], &v[j], bn, -d, damping)
         });
         last = if n > 1 { ends[0] } else { last };
-        let mut before = g[0];
+        // q⁺ v of the nodes before, here and after: in a loop of its own the compiler would take nodes for lanes, by gathers.
+        let ahead = |j: usize| {
+            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
+            weighed(&p[j], &v[j], bn, d, damping)
+        };
+        let mut before = ahead(0);
+        let mut here = ahead(1.min(n - 1));
         for j in 1..n - 1 {
             let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            let (after, here) = (g[j + 1], g[j]);
+            let after = ahead(j + 1);
             let (pj, vj) = (p[j], v[j]);
             let (mut to_chain, mut to, mut to_part) = (Complex::ZERO, Complex::ZERO, Lanes::ZERO);
             for l in 0..LANES {
@@ -323,7 +322,7 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
                 to.re[l] = xr.mul_add(cr, -(xi * ci));
                 to.im[l] = xr.mul_add(ci, xi * cr);
             }
-            (chain, last, before) = (to_chain, to, here);
+            (chain, last, before, here) = (to_chain, to, here, after);
             inverse[j] = chain;
             part[j] = to_part;
             g[j] = last;

@@ -69,6 +69,8 @@ pub(super) struct Batch {
     waves: Option<Waves>,
     march: March,
     nodes: Vec<Node>,
+    /// How far out in the apron a node across the march is.
+    sides: Vec<f64>,
     pub(super) records: Vec<Record>,
     pub(super) told: Vec<Told>,
     /// Energy (m²) of the other batches, told by the march before.
@@ -442,7 +444,7 @@ pub(super) fn quick(omega: f64, depth: f64) -> f64 {
 impl Batch {
     /// Marches over the whole grid; false if it was told to stop.
     fn walk(&mut self, grid: &Grid, share: f32, rim: f32, settings: &Settings, progress: &Progress<'_>) -> bool {
-        let Batch { axis, waves, march, nodes, records, told, before, kept, kept_b, kept_whole, .. } = self;
+        let Batch { axis, waves, march, nodes, sides, records, told, before, kept, kept_b, kept_whole, .. } = self;
         let Some(waves) = waves else { return true };
         let (columns, rows) = (grid.columns, grid.rows);
         let count = columns * rows;
@@ -463,6 +465,8 @@ impl Batch {
             march.whole.copy_from_slice(kept_whole);
         }
         nodes.resize(across, Node::default());
+        sides.clear();
+        sides.extend((0..across).map(|j| outward(j, across, apron_across)));
         let at = |step: usize, j: usize| {
             let step = if backward { steps - 1 - step } else { step };
             if along_x { j * columns + step } else { step * columns + j }
@@ -471,7 +475,7 @@ impl Batch {
             let out = outward(step, steps, apron_along);
             for (j, node) in nodes.iter_mut().enumerate() {
                 let i = at(step, j);
-                let away = out.max(outward(j, across, apron_across)) as f32;
+                let away = out.max(sides[j]) as f32;
                 let open = ((away - 0.4) / 0.6).clamp(0.0, 1.0);
                 *node = Node {
                     s: grid.s[i],
@@ -501,7 +505,7 @@ impl Batch {
             }
             for (j, node) in nodes.iter_mut().enumerate() {
                 let (here, next) = (at(step, j), at(step + 1, j));
-                let side = outward(j, across, apron_across);
+                let side = sides[j];
                 let pull = 5.0 * side * side / apron_across as f64 * (forward / apart);
                 *node = Node {
                     s: 0.5 * (grid.s[here] + grid.s[next]),

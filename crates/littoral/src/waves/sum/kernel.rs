@@ -23,13 +23,13 @@ pub(super) const FARTHEST: f64 = 1e12;
 const CHUNK: usize = 512;
 
 /// cos 2πr = `COSINE` · v · p(v²), v = |r| − ¼, p = (((v² + c₂) v² + c₁) v² + c₀).
-pub(super) const COSINE: f64 = 70.993_429_954_819;
+pub(crate) const COSINE: f64 = 70.993_429_954_819;
 const C0: f32 = -0.088_503_46;
 const C1: f32 = 0.582_267_15;
 const C2: f32 = -1.145_750_7;
 
 /// sin 2πr = ± `SINE` · q(v²), with the sign of r.
-pub(super) const SINE: f64 = 56.242_380_482_363_19;
+pub(crate) const SINE: f64 = 56.242_380_482_363_19;
 const S0: f32 = 0.017_780_185;
 const S1: f32 = -0.350_966_14;
 const S2: f32 = 1.154_549_1;
@@ -588,10 +588,17 @@ fn power_of_two(x: f32) -> f32 {
 /// Cosine and sine of a number of turns within ±10⁶.
 #[inline(always)]
 pub(crate) fn circle(turns: f32) -> (f32, f32) {
+    let (cosine, sine) = small_circle(turns);
+    (cosine * COSINE as f32, sine * SINE as f32)
+}
+
+/// Cosine over [`COSINE`] and sine over [`SINE`] of a number of turns within ±10⁶.
+#[inline(always)]
+pub(crate) fn small_circle(turns: f32) -> (f32, f32) {
     let r = turns - turns.round_ties_even();
     let v = r.abs() - 0.25;
     let u = v * v;
-    let cosine = v * (u + C2).mul_add(u, C1).mul_add(u, C0) * COSINE as f32;
-    let even = (u + S3).mul_add(u, S2).mul_add(u, S1).mul_add(u, S0) * SINE as f32;
+    let cosine = v * (u + C2).mul_add(u, C1).mul_add(u, C0);
+    let even = (u + S3).mul_add(u, S2).mul_add(u, S1).mul_add(u, S0);
     (cosine, f32::from_bits(even.to_bits() ^ (r.to_bits() & (1 << 31))))
 }
