@@ -22,7 +22,7 @@ pub struct Rim {
 /// What counts as being beyond a stretch of the border.
 #[derive(Clone, Copy, Debug)]
 pub struct Beyond {
-    /// Distance from the border (m); 0 within.
+    /// Distance from the border (m).
     pub away: f64,
     /// Mean depth (m) along the stretch, dry ground counting as 0.
     pub depth: f32,
@@ -64,11 +64,16 @@ impl Rim {
         Rim { low, extent, along, values, sums }
     }
 
-    /// What is to be expected at a place (m) beyond the border.
-    pub fn beyond(&self, at: DVec2) -> Beyond {
+    /// What is to be expected at a place (m) beyond the border; `None` within it.
+    pub fn beyond(&self, at: DVec2) -> Option<Beyond> {
         let p = at - self.low;
         let border = p.clamp(DVec2::ZERO, self.extent);
         let away = p.distance(border);
+        (away > 0.0).then(|| self.expected(p, border, away))
+    }
+
+    /// What is to be expected at a place (m from the south-western corner) so far from the nearest one of the border.
+    fn expected(&self, p: DVec2, border: DVec2, away: f64) -> Beyond {
         let DVec2 { x: width, y: height } = self.extent;
         let along = if p.y <= 0.0 {
             border.x
@@ -121,22 +126,25 @@ mod tests {
         let rim = Rim::new(&land, &land, &water);
         // At the border: its depth.
         for (at, depth) in [((5.0, 7.0), 1.0), ((75.0, 57.0), 8.0), ((40.0, 107.0), 4.5), ((35.0, 7.0), 30.0)] {
-            let beyond = rim.beyond(DVec2::from(at));
-            assert!((beyond.depth - depth).abs() < 0.02 && beyond.away == 0.0, "{at:?}: {beyond:?}");
+            let (at, middle) = (DVec2::from(at), DVec2::new(40.0, 57.0));
+            let beyond = rim.beyond(middle + (at - middle) * (1.0 + 1e-9)).expect("outside");
+            assert!((beyond.depth - depth).abs() < 0.02 && beyond.away < 1e-6, "{at:?}: {beyond:?}");
+            assert!(rim.beyond(middle + (at - middle) * 0.999).is_none());
             assert!((beyond.wet - 1.0).abs() < 1e-6);
         }
+        let depth = |x: f64, y: f64| rim.beyond(DVec2::new(x, y)).expect("outside").depth;
         // Far away: the mean of the whole, from all sides alike.
-        let mean = rim.beyond(DVec2::new(-9e3, 40.0)).depth;
-        assert!((rim.beyond(DVec2::new(40.0, 9e3)).depth - mean).abs() < 1e-4 && (3.0..8.0).contains(&mean));
+        let mean = depth(-9e3, 40.0);
+        assert!((depth(40.0, 9e3) - mean).abs() < 1e-4 && (3.0..8.0).contains(&mean));
         // The furrow is wider and shallower farther out.
-        let near = rim.beyond(DVec2::new(35.0, 2.0)).depth;
-        let far = rim.beyond(DVec2::new(35.0, -60.0)).depth;
+        let near = depth(35.0, 2.0);
+        let far = depth(35.0, -60.0);
         assert!(near > 25.0 && far < 15.0 && far > 4.0, "{near}, {far}");
         // No jumps, round the corners too.
-        let mut last = rim.beyond(DVec2::new(100.0, 40.0)).depth;
+        let mut last = depth(100.0, 40.0);
         for i in 1..=4000 {
             let turn = std::f64::consts::TAU * f64::from(i) / 4000.0;
-            let here = rim.beyond(DVec2::new(40.0 + 60.0 * turn.cos(), 57.0 + 75.0 * turn.sin())).depth;
+            let here = depth(40.0 + 60.0 * turn.cos(), 57.0 + 75.0 * turn.sin());
             assert!((here - last).abs() < 0.3, "{i}: {last} to {here}");
             last = here;
         }
@@ -148,9 +156,10 @@ mod tests {
         let land = Land::at(Raster::new(10, 10, DVec2::splat(50.0), heights).expect("valid"), DVec2::ZERO);
         let water = Water::flood(&land, 0.0).expect("wet");
         let rim = Rim::new(&land, &land, &water);
-        assert!(rim.beyond(DVec2::new(-30.0, 200.0)).wet > 0.99);
-        assert!(rim.beyond(DVec2::new(490.0, 200.0)).wet < 0.01);
-        let all = rim.beyond(DVec2::new(1e6, 200.0)).wet;
+        let wet = |x: f64| rim.beyond(DVec2::new(x, 200.0)).expect("outside").wet;
+        assert!(wet(-30.0) > 0.99);
+        assert!(wet(490.0) < 0.01);
+        let all = wet(1e6);
         assert!((0.4..0.6).contains(&all), "{all}");
     }
 }

@@ -379,7 +379,7 @@ impl Stage<'_> {
 
     /// How much of what lies at a place beyond the raster is sea, in [0, 1]: as much as of the border next to it.
     fn open_sea(&self, at: DVec2) -> f32 {
-        let beyond = self.rim.as_ref().map(|rim| rim.beyond(at)).filter(|beyond| beyond.away > 0.0);
+        let beyond = self.rim.as_ref().and_then(|rim| rim.beyond(at));
         beyond.map_or(1.0, |beyond| step(0.15, 0.85, beyond.wet))
     }
 
@@ -453,8 +453,7 @@ impl Stage<'_> {
     /// Depth of still water at a world position (m), negative where the ground is higher. Beyond the raster the bed sinks on.
     fn depth(&self, at: DVec2) -> f32 {
         let (Some(water), Some(rim)) = (self.scene.water, &self.rim) else { return 0.0 };
-        let beyond = rim.beyond(at);
-        if beyond.away > 0.0 {
+        if let Some(beyond) = rim.beyond(at) {
             return beyond.depth + 0.03 * beyond.away as f32;
         }
         let bed = self.ground.land.height_at(at).unwrap_or(f32::NEG_INFINITY);

@@ -166,12 +166,12 @@ impl Stage<'_> {
             let sample = &mut shaded[k];
             sample.light += mirrored * sample.mirror_share;
         }
-        // A spark brighter than this would speckle its surroundings; it keeps its colour.
-        let brightest = self.mist.max_element().max(1.0) * 30.0;
+        // A spark brighter than this would speckle its surroundings; sky and sun are no sparks.
+        let brightest = Vec3::splat(self.mist.max_element().max(1.0) * 30.0);
         for (samples, &i) in shaded.chunks_exact(per_pixel).zip(pixels) {
             for sample in samples {
                 let light = sample.light * sample.through + sample.veil;
-                sums[i].add(light * (brightest / light.max_element()).min(1.0), sample.sky);
+                sums[i].add(if sample.sky { light } else { light.min(brightest) }, sample.sky);
             }
         }
     }
