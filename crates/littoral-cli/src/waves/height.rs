@@ -7,7 +7,7 @@ use crate::points::{self, Typed};
 use crate::subject::Subject;
 use crate::talk::{Failure, Talk, tidy, written};
 use glam::{DVec2, Vec3};
-use littoral::field::{Land, Sea, Surface, Water, coast};
+use littoral::field::{Beach, Land, Sea, Surface, coast};
 use littoral::space::Datum;
 use littoral::waves::SeaState;
 use serde::Serialize;
@@ -142,21 +142,17 @@ struct Shown {
     sea: Sea,
     land: Option<Subject>,
     /// Where a swash could get to.
-    beach: Option<Water>,
+    beach: Option<Beach>,
 }
 
 impl Shown {
     /// Whether waves may wet a place, as pictures have it: it lies in still water, or on a shore that rises from it.
-    fn may_be_wet(&self, place: DVec2, ground: Option<f64>) -> bool {
+    fn may_be_wet(&self, place: DVec2) -> bool {
         let Some(land) = &self.land else { return true };
-        let still = land.water.as_ref().is_some_and(|water| water.covers(place));
-        let shore = ground.is_some_and(|ground| ground >= self.sea.level());
-        still || shore && self.beach.as_ref().is_some_and(|beach| beach.covers(place))
+        land.water.as_ref().is_some_and(|water| water.covers(place))
+            || self.beach.as_ref().is_some_and(|beach| beach.covers(&land.land, place))
     }
 }
-
-/// No swash is followed higher above still water (m), here as in pictures.
-const HIGHEST_SWASH: f64 = 3.0;
 
 impl Height {
     /// Runs the command.
@@ -233,7 +229,7 @@ impl Height {
                 subject.name
             )));
         };
-        let beach = Water::flood(&subject.land, level + HIGHEST_SWASH);
+        let beach = subject.water.as_ref().and_then(|water| Beach::of(&subject.land, water));
         Ok(Shown { sea, land: Some(subject), beach })
     }
 
@@ -260,7 +256,7 @@ impl Height {
         for (i, surface) in surfaces.iter().enumerate() {
             misses.total += 1;
             let ground = shown.land.as_ref().and_then(|land| height_at(&land.land, places[i])).map(f64::from);
-            let wet = shown.may_be_wet(places[i], ground) && ground.is_none_or(|ground| ground < surface.height);
+            let wet = shown.may_be_wet(places[i]) && ground.is_none_or(|ground| ground < surface.height);
             if !wet {
                 misses.dry(&typed[i].text, ground, surface.height);
                 known.push(None);

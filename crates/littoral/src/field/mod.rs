@@ -22,7 +22,7 @@ pub use land::Land;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
 pub use sea::{Finest, Sea, Surface};
-pub use water::Water;
+pub use water::{Beach, Water};
 pub(crate) use windows::FINEST_WINDOWS;
 
 use crate::space::{Cell, Datum, Place};

@@ -149,6 +149,29 @@ impl Water {
     }
 }
 
+/// The shore that rises from some water, as far up as swash is followed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beach {
+    level: f64,
+    /// The water as it would stand that much higher.
+    higher: Water,
+}
+
+impl Beach {
+    /// How high above still water swash is followed (m).
+    pub const HIGHEST: f64 = 3.0;
+
+    /// The shore of `water` on `land`.
+    pub fn of(land: &Land, water: &Water) -> Option<Beach> {
+        Some(Beach { level: water.level, higher: Water::flood(land, water.level + Beach::HIGHEST)? })
+    }
+
+    /// Whether swash may get to a place (m) of that land. Ground behind the shore that is lower than still water stays dry.
+    pub fn covers(&self, land: &Land, at: DVec2) -> bool {
+        self.higher.covers(at) && land.height_at(at).is_some_and(|ground| f64::from(ground) >= self.level)
+    }
+}
+
 /// Things that belong together, each with one that stands for it, at the end with the least of all.
 pub(super) struct Trees(Vec<usize>);
 
@@ -308,6 +331,17 @@ mod tests {
             }
             assert_eq!(water.open, open);
         }
+    }
+
+    #[test]
+    fn a_beach_rises_from_the_water_and_is_no_polder() {
+        // Sea, a beach of 1 m, a polder behind it, a dike of 9 m, another polder.
+        let land = strip(&[-5.0, -1.0, 1.0, -2.0, 9.0, -2.0]);
+        let water = Water::flood(&strip(&[-5.0, -1.0, 1.0, 2.0, 9.0, 2.0]), 0.0).expect("wet in the west");
+        let beach = Beach::of(&strip(&[-5.0, -1.0, 1.0, 2.0, 9.0, 9.0]), &water).expect("a beach");
+        let covers = |x: f64| beach.covers(&land, DVec2::new(x - 2.5, 0.0));
+        assert!(covers(2.0) && !covers(1.0) && !covers(3.0) && !covers(5.0));
+        assert!(!covers(40.0) && !covers(f64::NAN));
     }
 
     #[test]

@@ -11,8 +11,8 @@ use super::shade::Ahead;
 use super::skylight::{Skylight, irradiance};
 use super::tile::{Mosaic, Pixel, TILE};
 use super::waves::Wet;
-use super::{Medium, Picture, Scene, Settings, Style, Water};
-use crate::field::Sea;
+use super::{Medium, Picture, Scene, Settings, Style};
+use crate::field::{Beach, Sea};
 use crate::raycast::{LocalRay, RayCaster};
 use crate::space::View;
 use glam::{DVec2, DVec3, UVec2, Vec3};
@@ -36,8 +36,8 @@ pub struct Stage<'a> {
     pub(super) tints: Tints,
     /// The land's border, where water goes on beyond it.
     pub(super) rim: Option<Rim>,
-    /// The water as it would stand a little higher, once somebody asks for it: where swash may run.
-    beach: OnceLock<Option<Water>>,
+    /// Where swash may run, once somebody asks.
+    beach: OnceLock<Option<Beach>>,
 }
 
 /// Casts many rays whose origins count from the eye. There is one for pictures, and one for tests that shows it right.
@@ -106,12 +106,8 @@ impl<'a> Stage<'a> {
     /// Whether waves may wet a place within the raster or beyond: it lies in still water, or on a shore that rises from it.
     pub(super) fn may_be_wet(&self, at: DVec2) -> bool {
         let Some(water) = self.scene.water else { return false };
-        water.covers(at) || {
-            let land = self.scene.land;
-            let beach = self.beach.get_or_init(|| Water::flood(land, water.level + HIGHEST_SWASH));
-            let ground = || land.height_at(at).map_or(f64::NEG_INFINITY, f64::from);
-            beach.as_ref().is_some_and(|beach| beach.covers(at)) && ground() >= water.level
-        }
+        let beach = || self.beach.get_or_init(|| Beach::of(self.scene.land, water)).as_ref();
+        water.covers(at) || beach().is_some_and(|beach| beach.covers(self.scene.land, at))
     }
 
     /// Whether the style is that of a map, on which water is a colour.
@@ -258,9 +254,6 @@ impl<'a> Stage<'a> {
         }
     }
 }
-
-/// How high above still water swash is followed (m).
-pub(super) const HIGHEST_SWASH: f64 = 3.0;
 
 /// The greatest height for which the air's tables are made (m); from higher up, the way to the air adds nothing.
 pub(super) const HIGHEST_EYE: f64 = 60_000.0;
