@@ -131,6 +131,25 @@ impl Water {
         self.reach[sample] == FLOODED
     }
 
+    /// Whether a sample of the land, counted row by row from the south, lies under water of which no bed is known: it is void, or holds the water's surface
+    /// in place of its bed, as whole squares of samples just at the level do. A line of such is a shore.
+    pub fn is_unsounded(&self, land: &Land, sample: usize) -> bool {
+        let raster = land.raster();
+        if !self.floods(sample) || raster.voids().is_void(sample) {
+            return self.floods(sample);
+        }
+        let level = self.level as f32;
+        let (column, row) = (sample % self.columns, sample / self.columns);
+        let at = |c: usize, r: usize| raster.heights()[r * self.columns + c] == level;
+        let square = |c: usize, r: usize| at(c, r) && at(c + 1, r) && at(c, r + 1) && at(c + 1, r + 1);
+        let (columns, rows) = (column.saturating_sub(1)..=column, row.saturating_sub(1)..=row);
+        at(column, row)
+            && columns.filter(|c| c + 1 < self.columns).any(|c| {
+                let mut rows = rows.clone().filter(|r| r + 1 < self.rows);
+                rows.any(|r| square(c, r))
+            })
+    }
+
     /// Whether the water goes on beyond any edge of the raster.
     pub fn reaches_horizon(&self) -> bool {
         self.open.contains(&true)
@@ -342,6 +361,16 @@ mod tests {
         let covers = |x: f64| beach.covers(&land, DVec2::new(x - 2.5, 0.0));
         assert!(covers(2.0) && !covers(1.0) && !covers(3.0) && !covers(5.0));
         assert!(!covers(40.0) && !covers(f64::NAN));
+    }
+
+    #[test]
+    fn squares_at_the_level_are_unsounded_and_lines_are_a_shore() {
+        let heights = vec![0.0, 0.0, -1.0, 0.0, 2.0, f32::NAN].repeat(3);
+        let land = Land::new(Raster::new(6, 3, DVec2::ONE, heights).expect("valid"));
+        let water = Water::flood(&land, 0.0).expect("wet in the west");
+        let unsounded = |column: usize| water.is_unsounded(&land, 6 + column);
+        assert!(unsounded(0) && unsounded(1) && !unsounded(2) && !unsounded(3) && !unsounded(4));
+        assert_eq!(unsounded(5), water.floods(11));
     }
 
     #[test]

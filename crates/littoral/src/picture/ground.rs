@@ -366,10 +366,9 @@ fn with_sunk_bed(land: &Land, water: &Water) -> Option<Land> {
     const FALL: f32 = 0.05;
     const DEEPEST: f32 = 80.0;
     let raster = land.raster();
-    let (columns, rows, voids) = (raster.columns(), raster.rows(), raster.voids());
+    let (columns, rows) = (raster.columns(), raster.rows());
     let level = water.level as f32;
-    let dry: Vec<bool> =
-        (0..columns * rows).map(|i| !(water.floods(i) && (voids.is_void(i) || raster.heights()[i] == level))).collect();
+    let dry: Vec<bool> = (0..columns * rows).map(|i| !water.is_unsounded(land, i)).collect();
     let unsounded = dry.iter().filter(|dry| !**dry).count();
     // A few samples that happen to lie at the level are a shore.
     if unsounded < (columns * rows) / 500 + 8 {

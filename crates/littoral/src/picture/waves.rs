@@ -215,10 +215,6 @@ impl Stage<'_> {
             lanes[i].below?;
             let at = DVec2::new(points.x[i], points.y[i]);
             let surface = sea.surface(&found, i);
-            // Where the search for the water came out a little off, ground may be higher: a thin edge that is dry.
-            if self.scene.land.height_at(at).is_some_and(|ground| f64::from(ground) > surface.height) {
-                return None;
-            }
             let position = at.extend(surface.height - self.drop_at(at));
             let mut wet =
                 Wet { position, slope: surface.slope, hidden: surface.hidden, foam: surface.foam, rest: surface.rest };

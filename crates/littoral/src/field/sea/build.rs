@@ -95,7 +95,7 @@ fn bed_of(land: &Land, water: &Water) -> Result<Bed, OutOfRange> {
                 for i in (column * stride).saturating_sub(half)..(column * stride + half + 1).min(columns) {
                     let at = j * columns + i;
                     let depth = water.level - f64::from(raster.heights()[at]);
-                    known &= !(water.floods(at) && (raster.voids().is_void(at) || depth == 0.0));
+                    known &= !water.is_unsounded(land, at);
                     sum += depth;
                     count += 1;
                 }
