@@ -1,7 +1,7 @@
 //! Films: a path, and a picture for each moment of it.
 
 use crate::ground::System;
-use crate::render::Subject;
+use crate::subject::Subject;
 use crate::talk::{Failure, Talk, progress, seconds as shown_seconds, tidy};
 use glam::{DVec2, UVec2};
 use littoral::field::Sea;

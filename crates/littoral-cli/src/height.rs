@@ -1,13 +1,13 @@
 //! `littoral height`: exact heights at points.
 
 use crate::ground::{Opened, Reading, System, height_at};
-use crate::input;
+use crate::points::Typed;
 use crate::talk::{Failure, Talk, written};
 use glam::DVec2;
 use littoral::field::Land;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Exact heights at points.
@@ -38,21 +38,6 @@ pub struct Height {
     normals: bool,
     #[command(flatten)]
     reading: Reading,
-}
-
-/// A point and how it was written.
-#[derive(Clone)]
-struct Typed {
-    xy: DVec2,
-    text: String,
-}
-
-impl std::str::FromStr for Typed {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Typed, String> {
-        Ok(Typed { xy: input::xy(text)?, text: text.trim().to_owned() })
-    }
 }
 
 #[derive(Serialize)]
@@ -139,46 +124,25 @@ impl Height {
         answer: &mut Answer,
     ) -> Result<(), Failure> {
         let land = opened.whole(talk)?;
-        let name = if points == Path::new("-") { "standard input".to_owned() } else { points.display().to_string() };
-        let reader: Box<dyn Read> = match points == Path::new("-") {
-            true => Box::new(std::io::stdin().lock()),
-            false => Box::new(std::fs::File::open(points).map_err(|e| littoral_data::Error::io(points, e))?),
-        };
-        let mut reader = BufReader::with_capacity(1 << 20, reader);
-        let (mut block, mut lines_before) = (Vec::new(), 0);
-        let stdout = std::io::stdout();
-        loop {
-            block.clear();
-            let got = fill(&mut reader, &mut block).map_err(|e| Failure::Work(format!("{name}: {e}")))?;
-            if got == 0 {
-                return Ok(());
-            }
-            let lines: Vec<&[u8]> = block.strip_suffix(b"\n").unwrap_or(&block).split(|&b| b == b'\n').collect();
-            type Looked = Result<Option<(DVec2, DVec2, Found)>, String>;
-            let look = |(number, line): (usize, &&[u8])| -> Looked {
-                let text =
-                    std::str::from_utf8(line).map_err(|_| at_line(&name, lines_before + number, "binary data"))?;
-                let Some(xy) = point(text).map_err(|got| at_line(&name, lines_before + number, got))? else {
-                    return Ok(None);
-                };
-                let local = opened.frame.local(system, xy).map_err(|e| format!("{}: {e}", opened.file.display()))?;
-                Ok(Some((xy, local, self.find(&land, local))))
+        crate::points::stream(points, |typed| {
+            let look = |point: &Typed| -> Result<(DVec2, Found), String> {
+                let local =
+                    opened.frame.local(system, point.xy).map_err(|e| format!("{}: {e}", opened.file.display()))?;
+                Ok((local, self.find(&land, local)))
             };
-            let looked: Vec<Looked> = lines.par_iter().enumerate().with_min_len(256).map(look).collect();
-            let mut text = Vec::with_capacity(2 * block.len());
-            for (line, looked) in lines.iter().zip(looked) {
-                let Some((xy, local, found)) = looked.map_err(Failure::Work)? else { continue };
-                misses.count(opened, xy, local, &found);
+            let looked: Vec<_> = typed.par_iter().with_min_len(256).map(look).collect();
+            let mut text = Vec::with_capacity(64 * typed.len());
+            for (point, looked) in typed.iter().zip(looked) {
+                let (local, found) = looked.map_err(Failure::Work)?;
+                misses.count(opened, point.xy, local, &found);
                 if talk.json() {
                     self.say(talk, "", found, answer)?;
                 } else {
-                    let given = String::from_utf8_lossy(line);
-                    self.line(&comma_separated(given.trim()), found, &mut text);
+                    self.line(&point.text, found, &mut text);
                 }
             }
-            written(stdout.lock().write_all(&text))?;
-            lines_before += lines.len();
-        }
+            written(std::io::stdout().lock().write_all(&text))
+        })
     }
 }
 
@@ -208,81 +172,6 @@ impl Misses {
     }
 }
 
-/// At most about a mebibyte of whole lines.
-fn fill(reader: &mut impl BufRead, block: &mut Vec<u8>) -> std::io::Result<usize> {
-    // A line longer than this is no point.
-    const LONGEST: u64 = 1 << 16;
-    reader.by_ref().take(1 << 20).read_to_end(block)?;
-    if block.last().is_some_and(|&b| b != b'\n') {
-        reader.by_ref().take(LONGEST).read_until(b'\n', block)?;
-    }
-    Ok(block.len())
-}
-
-/// The point in a line; `None` for blank lines, comments and a header.
-fn point(line: &str) -> Result<Option<DVec2>, &str> {
-    let line = line.trim();
-    if line.is_empty()
-        || line.starts_with('#')
-        || line.starts_with(|c: char| c.is_alphabetic()) && !line.starts_with(['n', 'N', 'i', 'I'])
-    {
-        return Ok(None);
-    }
-    let mut parts = line.split([',', ';', ' ', '\t']).filter(|part| !part.is_empty());
-    let mut next = || parts.next().and_then(|part| part.parse::<f64>().ok()).filter(|n| n.is_finite());
-    match (next(), next()) {
-        (Some(x), Some(y)) => Ok(Some(DVec2::new(x, y))),
-        _ => Err(line),
-    }
-}
-
-/// A point's text with commas between its numbers.
-fn comma_separated(line: &str) -> String {
-    if line.contains([' ', '\t', ';']) {
-        line.split([',', ';', ' ', '\t']).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(",")
-    } else {
-        line.to_owned()
-    }
-}
-
-fn at_line(name: &str, line: usize, got: &str) -> String {
-    let got: String = got.chars().take(60).collect();
-    format!("{name}: line {}: expected X,Y, got \"{got}\"; correct or remove the line", line + 1)
-}
-
 fn shown(number: f32) -> String {
     if number.is_nan() { "nan".into() } else { number.to_string() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_are_points_or_skipped_or_wrong() {
-        let at = |x, y| Ok(Some(DVec2::new(x, y)));
-        assert_eq!(point("1,2"), at(1.0, 2.0));
-        assert_eq!(point(" -1.5e3 \t 2 extra\r"), at(-1500.0, 2.0));
-        assert_eq!(point("1;2"), at(1.0, 2.0));
-        for skipped in ["", "  ", "# note", "x,y", "lon lat"] {
-            assert_eq!(point(skipped), Ok(None), "{skipped}");
-        }
-        for wrong in ["1", "1,b", "nan,1", "inf,2", "?"] {
-            assert_eq!(point(wrong), Err(wrong));
-        }
-        assert_eq!(comma_separated("1 \t2 3"), "1,2,3");
-    }
-
-    #[test]
-    fn blocks_end_at_lines() {
-        let text = "123456,789\n".repeat(300_000);
-        let mut reader = BufReader::new(text.as_bytes());
-        let (mut block, mut total) = (Vec::new(), 0);
-        while fill(&mut reader, &mut block).expect("memory") > 0 {
-            assert_eq!(block.last(), Some(&b'\n'));
-            total += block.len();
-            block.clear();
-        }
-        assert_eq!(total, text.len());
-    }
 }

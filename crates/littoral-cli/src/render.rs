@@ -1,15 +1,17 @@
 //! `littoral render`: pictures and films.
 
 use crate::film;
-use crate::ground::{Frame, Opened, Reading, System, height_at};
+use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
+use crate::subject::Subject;
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
+use crate::waves::state as sea;
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
-use littoral::field::{Lakes, Land, Sea, Water, coast};
+use littoral::field::{Sea, coast};
 use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
 use littoral::space::{Ray, View};
-use littoral::waves::{SeaState, spec::SpecError};
+use littoral::waves::SeaState;
 use littoral_data::write::{self, Layer, PngPixels};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -31,6 +33,7 @@ use std::time::Instant;
   littoral render dem.tif --out linear.exr --passes depth,normal
   littoral render dem.tif --sea wind=14,from=300 --sun 300,8
   littoral render --sea beaufort=8,from=240                the coast in a storm
+  littoral render --sea buoy=41010.data_spec               in the waves that a buoy measured
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
   littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4
@@ -86,12 +89,12 @@ pub struct Render {
     #[arg(long, value_name = "METRES|none", value_parser = input::water, default_value = "0", help_heading = "Look")]
     water: WaterLevel,
     /// The waves on the sea: wind=15,from=240 (m/s, and where it blows from), hs=2,tp=9 (height and period), beaufort=6, douglas=4 or calm;
-    /// more with fetch=KM, swell=HEIGHT@PERIOD/FROM, model=, gamma=, spread=, depth=, seed= [default: calm; the built-in coast:
-    /// beaufort=4,from=225]
-    #[arg(long, value_name = "SPEC", value_parser = sea_state, help_heading = "Look")]
-    sea: Option<SeaState>,
+    /// buoy=FILE (an NDBC spectrum); more with fetch=KM, swell=HEIGHT@PERIOD/FROM, model=, gamma=, spread=, depth=, seed=
+    /// [default: calm; the built-in coast: beaufort=4,from=225]
+    #[arg(long, value_name = "SPEC", help_heading = "Look")]
+    sea: Option<String>,
     /// The instant of the sea in seconds; of a film, that of its first frame
-    #[arg(long, value_name = "S", value_parser = instant, default_value = "0", help_heading = "Look")]
+    #[arg(long, value_name = "S", value_parser = input::instant, default_value = "0", help_heading = "Look")]
     time: f64,
     /// How far one sees: 10 in haze, 40 on a clear day, 200 in the clearest air [default: what suits the land]
     #[arg(long, value_name = "KILOMETRES", value_parser = input::positive, help_heading = "Look")]
@@ -126,14 +129,6 @@ pub struct Render {
     save_path: Option<PathBuf>,
 }
 
-fn sea_state(text: &str) -> Result<SeaState, String> {
-    text.parse().map_err(|e: SpecError| e.to_string())
-}
-
-fn instant(text: &str) -> Result<f64, String> {
-    input::within(text, -1e9, 1e9, "-1e9 to 1e9 seconds")
-}
-
 fn fps(text: &str) -> Result<f64, String> {
     input::within(text, 0.01, 1000.0, "0.01 to 1000 frames a second")
 }
@@ -162,27 +157,6 @@ enum Pass {
     Position,
     /// Height (m)
     Height,
-}
-
-/// At most so many samples are drawn without `--full`.
-const FITTING: usize = 16 << 20;
-
-/// What is drawn: land and all that belongs to it.
-pub struct Subject {
-    /// What it is called.
-    pub name: String,
-    /// The ground, heights stretched.
-    pub land: Land,
-    /// The water.
-    pub water: Option<Water>,
-    /// The lakes.
-    pub lakes: Option<Lakes>,
-    /// How coordinates and local metres belong together.
-    pub frame: Frame,
-    /// What heights are counted from, in words.
-    pub datum: String,
-    /// By how much heights are stretched.
-    pub exaggeration: f64,
 }
 
 #[derive(Serialize)]
@@ -217,9 +191,11 @@ impl Render {
             check_output(save, &inputs)?;
         }
 
-        let subject = self.subject(talk)?;
+        let state = self.sea.as_deref().map(|spec| sea::read(spec, talk)).transpose()?;
+        let (reading, full, stretch) = (self.reading, self.full, self.exaggeration);
+        let subject = Subject::open(&self.files, reading, full, stretch, self.water, talk)?;
         let (mut shot, look) = self.shot(&subject, self.files.is_empty(), talk)?;
-        let film = self.film(&out, &shot);
+        let film = self.film(&out, &shot, state.as_ref());
         if let Some(film) = &film {
             shot.shot.border = film.border(&subject)?;
             shot.shot.air.veils_distance = shot.border == Border::Mist || self.visibility.is_some();
@@ -233,7 +209,7 @@ impl Render {
             ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
         };
         let stage = Stage::new(&scene);
-        let mut sea = self.waves(&subject, talk)?;
+        let mut sea = self.waves(state.as_ref(), &subject, talk)?;
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
             return film.run(&subject, &stage, sea.as_mut(), &settings, started, talk);
@@ -281,37 +257,19 @@ impl Render {
     }
 
     /// The waves on the subject's water at the first instant.
-    fn waves(&self, subject: &Subject, talk: &mut Talk) -> Result<Option<Sea>, Failure> {
-        let state = match &self.sea {
-            Some(state) => state.clone(),
-            None if self.files.is_empty() => coast::sea_state(),
-            None => return Ok(None),
-        };
-        let Some(water) = &subject.water else {
-            if self.sea.is_some() {
-                talk.warn(format!("{}: no water for --sea; --water METRES says how high it stands", subject.name));
-            }
-            return Ok(None);
-        };
-        // Bearings count from true north, headings from the land's x axis.
-        let state = state.turned(-subject.frame.north());
-        if state.trains.is_empty() {
-            return Ok(None);
+    fn waves(&self, state: Option<&SeaState>, subject: &Subject, talk: &mut Talk) -> Result<Option<Sea>, Failure> {
+        if subject.water.is_none() && state.is_some() {
+            talk.warn(format!("{}: no water for --sea; --water METRES says how high it stands", subject.name));
         }
-        let bar = progress(1000, "carrying the waves over the bed");
-        let told = |done: f64| {
-            bar.set_position((done * 1000.0) as u64);
-            true
-        };
-        let made = Sea::over(&subject.land, water, &state, &told);
-        bar.finish_and_clear();
-        let mut sea = made.map_err(|e| Failure::Work(format!("{}: {e}", subject.name)))?;
-        sea.set_time(self.time);
-        Ok(Some(sea))
+        let own = self.files.is_empty().then(coast::sea_state);
+        match state.or(own.as_ref()).filter(|state| !state.trains.is_empty()) {
+            Some(state) => subject.sea(state, self.time),
+            None => Ok(None),
+        }
     }
 
     /// The film that is wanted, if one is.
-    fn film<'a>(&'a self, out: &'a Output, shot: &Framed) -> Option<film::Order<'a>> {
+    fn film<'a>(&'a self, out: &'a Output, shot: &Framed, sea: Option<&SeaState>) -> Option<film::Order<'a>> {
         /// Vertical angle of view (rad) of a moderate wide-angle lens: a film moves, whatever lens a still picture has.
         const LENS: f64 = 0.62;
         let path = self.path.as_deref()?;
@@ -323,8 +281,8 @@ impl Render {
             out: &out.file,
             folder: out.kind == Kind::Frames,
             look: format!(
-                "{:?} {:?} {:?} water {:?} sea {:?} time {}",
-                shot.sun, shot.air, shot.style, self.water, self.sea, self.time
+                "{:?} {:?} {:?} water {:?} sea {sea:?} time {}",
+                shot.sun, shot.air, shot.style, self.water, self.time
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,
@@ -393,41 +351,6 @@ impl Render {
             ));
         }
         Ok(Output { file: out.clone(), kind })
-    }
-
-    fn subject(&self, talk: &mut Talk) -> Result<Subject, Failure> {
-        let (name, land, frame, datum) = match &self.files[..] {
-            [] => {
-                ("the built-in coast".to_owned(), coast::coast(), Frame::metres(), "heights above its sea level".into())
-            }
-            files => {
-                let (land, frame, datum) = self.loaded(files, talk)?;
-                (littoral_data::name_of_all(files).display().to_string(), land, frame, datum)
-            }
-        };
-        let land = match self.exaggeration {
-            1.0 => land,
-            factor => {
-                let origin = land.origin();
-                Land::at(land.raster().clone().exaggerated(factor as f32), origin)
-            }
-        };
-        let water = match self.water {
-            WaterLevel::None => None,
-            WaterLevel::At(level) => Water::flood(&land, level * self.exaggeration),
-        };
-        let lakes = match self.water {
-            WaterLevel::None => None,
-            _ => Lakes::find(&land, water.as_ref()),
-        };
-        Ok(Subject { name, land, water, lakes, frame, datum, exaggeration: self.exaggeration })
-    }
-
-    /// Land at a resolution that fits a picture.
-    fn loaded(&self, files: &[PathBuf], talk: &mut Talk) -> Result<(Land, Frame, String), Failure> {
-        let mut opened = Opened::open_all(files, self.reading, talk)?;
-        let (land, frame) = opened.fitting(if self.full { usize::MAX } else { FITTING }, talk)?;
-        Ok((land, frame, opened.datum()))
     }
 
     /// The view, and the point it looks at.
@@ -591,33 +514,6 @@ enum Kind {
     Exr,
     Film,
     Frames,
-}
-
-impl Subject {
-    /// Local metres of typed coordinates.
-    pub fn local(&self, system: System, at: DVec2) -> Result<DVec2, Failure> {
-        self.frame.local(system, at).map_err(|e| Failure::Work(format!("{}: {e}", self.name)))
-    }
-
-    /// Height (m, stretched) of ground or water below a local position.
-    pub fn surface(&self, local: DVec2) -> Option<f64> {
-        let ground = height_at(&self.land, local).map(f64::from);
-        let water = self.water.as_ref().filter(|water| water.covers(local)).map(|water| water.level);
-        match (ground, water) {
-            (Some(ground), Some(water)) => Some(ground.max(water)),
-            (ground, water) => ground.or(water),
-        }
-    }
-
-    /// A local position in the file's coordinates, its height as unstretched.
-    pub fn given(&self, local: DVec3) -> DVec3 {
-        self.frame.crs(local.truncate()).extend(local.z / self.exaggeration)
-    }
-
-    /// `X,Y,Z` as it can be typed.
-    pub fn shown(&self, given: DVec3) -> String {
-        format!("{},{},{}", self.frame.shown(given.x), self.frame.shown(given.y), tidy(given.z, 1))
-    }
 }
 
 /// The climate where the land lies.

@@ -1,6 +1,8 @@
 //! `littoral waves`: numbers and plots of waves.
 
 mod dispersion;
+mod export;
+mod height;
 mod picture;
 mod spectrum;
 pub mod state;
@@ -8,12 +10,15 @@ mod summary;
 
 use crate::talk::{Failure, Talk};
 
-/// Waves in numbers and plots: spectra of the sea, and how fast waves run.
+/// Waves in numbers and plots: spectra of the sea, how fast waves run, how high the water stands,
+/// and tiles of sea for other programs.
 #[derive(clap::Args)]
 #[command(after_help = "Start here:
   littoral waves spectrum --wind 15                   the sea a wind of 15 m/s raises
   littoral waves spectrum --buoy 41010.data_spec      what a buoy measured
-  littoral waves dispersion --period 8 --depth 5      how long and fast an 8 s wave is in 5 m")]
+  littoral waves dispersion --period 8 --depth 5      how long and fast an 8 s wave is in 5 m
+  littoral waves height --sea wind=15 --at 0,0        how high that sea stands, and how it runs
+  littoral waves export --sea wind=15 --out sea.exr   a tile of it, for other programs")]
 pub struct Waves {
     #[command(subcommand)]
     command: Command,
@@ -23,6 +28,8 @@ pub struct Waves {
 enum Command {
     Spectrum(Box<spectrum::Spectrum>),
     Dispersion(dispersion::Dispersion),
+    Height(Box<height::Height>),
+    Export(Box<export::Export>),
 }
 
 impl Waves {
@@ -31,6 +38,8 @@ impl Waves {
         match self.command {
             Command::Spectrum(command) => command.run(talk),
             Command::Dispersion(command) => command.run(talk),
+            Command::Height(command) => command.run(talk),
+            Command::Export(command) => command.run(talk),
         }
     }
 }

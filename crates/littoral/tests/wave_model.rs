@@ -3,6 +3,8 @@
 //! A new model adds one test that calls [`conforms`].
 
 use glam::DVec2;
+use littoral::waves::cascades::{self, Cascades};
+use littoral::waves::shore::{Bed, ShoreSea};
 use littoral::waves::{
     BLOCK, Beach, Bounds, Length, Motion, Path, Peachey, PlaneWave, Points, STANDARD_GRAVITY, SeaState, Sine, Sines,
     StillWater, Superposition, Surf, Swell, Velocity, WaveModel,
@@ -51,6 +53,12 @@ struct Expected {
     flowing: bool,
     /// Greatest root mean square of the divergence of the velocity in parts of that of its largest term.
     divergence: f64,
+    /// Whether sideways motion may curl, as where a bed turns waves: then `dxy` is the mean of both of its derivatives.
+    curling: bool,
+    /// How much velocities may err beyond that: they are linear waves' where crests are sharpened and fronts steepened.
+    sharpened: f64,
+    /// What may be left of the motion (m) where a footprint hides all waves: set-up by a shore.
+    left: f32,
     /// Relative scatter of slopes' variance over a few thousand points.
     scatter: f64,
 }
@@ -63,6 +71,9 @@ const USUAL: Expected = Expected {
     creases: 0.0,
     flowing: false,
     divergence: 3e-3,
+    curling: false,
+    left: 0.0,
+    sharpened: 0.0,
     scatter: 0.1,
 };
 
@@ -187,7 +198,7 @@ fn derivatives_are_those_of_the_displacement(model: &mut dyn WaveModel, expected
         for lane in 0..BLOCK {
             let found =
                 [here.slope_x, here.slope_y, here.dxx, here.dxy, here.dxy, here.dyy].map(|f| f64::from(f[lane]));
-            let differences = [
+            let mut differences = [
                 by(|m| &m.dz, 0, lane),
                 by(|m| &m.dz, 1, lane),
                 by(|m| &m.dx, 0, lane),
@@ -195,6 +206,10 @@ fn derivatives_are_those_of_the_displacement(model: &mut dyn WaveModel, expected
                 by(|m| &m.dy, 0, lane),
                 by(|m| &m.dy, 1, lane),
             ];
+            if expected.curling {
+                let mean = 0.5 * (differences[3] + differences[4]);
+                (differences[3], differences[4]) = (mean, mean);
+            }
             for (pairs, pair) in pairs.iter_mut().zip(differences.into_iter().zip(found)) {
                 pairs.push(pair);
             }
@@ -327,6 +342,7 @@ fn instants_may_come_in_any_order(model: &mut dyn WaveModel, expected: Expected)
 
 fn bounds_hold(model: &mut dyn WaveModel, expected: Expected) {
     let mut most = Bounds::default();
+    let mut creased = 0;
     for seed in 0..600 {
         if seed % 20 == 0 {
             model.set_time(seed as f64 * 1.7);
@@ -358,11 +374,20 @@ fn bounds_hold(model: &mut dyn WaveModel, expected: Expected) {
             for lane in 0..BLOCK {
                 let curvature = f64::from(tilted.slope_x[lane] - m.slope_x[lane]).abs() / h;
                 let noise = 1e-6 * f64::from(bounds.slope) / h;
-                assert!(curvature <= f64::from(bounds.curvature) + noise, "curvature {curvature} of {bounds:?}");
+                let mut beyond = Vec::new();
+                if curvature > f64::from(bounds.curvature) + noise {
+                    beyond.push(("curvature", curvature));
+                }
                 let bend =
                     f64::from(tilted.dxx[lane] - m.dxx[lane]).hypot(f64::from(tilted.dxy[lane] - m.dxy[lane])) / h;
                 let noise = 1e-6 * f64::from(bounds.stretch) / h;
-                assert!(bend <= f64::from(bounds.bend) + noise, "bend {bend} of {bounds:?}");
+                if bend > f64::from(bounds.bend) + noise {
+                    beyond.push(("bend", bend));
+                }
+                // Across a crease a second derivative has no bound.
+                creased += usize::from(!beyond.is_empty());
+                let most = (600.0 * BLOCK as f64 * expected.creases) as usize;
+                assert!(creased <= most, "{beyond:?} of {bounds:?}");
             }
         }
     }
@@ -425,7 +450,8 @@ fn footprints_keep_the_slopes_variance(model: &mut dyn WaveModel, expected: Expe
     }
     // In the end nothing is left but hidden slopes.
     let blind = motion(model, &Points { footprint: [1e9; BLOCK], ..places(expected, 1) });
-    assert_eq!([blind.dz[0], blind.slope_x[1], blind.slope_y[2], blind.dx[3]], [0.0; 4]);
+    let left = [blind.dz[0], blind.slope_x[1], blind.slope_y[2], blind.dx[3]];
+    assert!(left.iter().all(|x| x.abs() <= expected.left), "{left:?} is left");
 }
 
 fn nothing_is_ever_not_a_number(model: &mut dyn WaveModel) {
@@ -478,7 +504,7 @@ fn water_moves_with_its_surface(model: &mut dyn WaveModel, expected: Expected) {
         }
     }
     let scale = root_mean_square(&pairs[0].iter().map(|pair| pair.1).collect::<Vec<_>>());
-    let error = expected.error + 1e-6 * f64::from(model.bounds().height) / step / scale;
+    let error = expected.error + expected.sharpened + 1e-6 * f64::from(model.bounds().height) / step / scale;
     agree("upward velocity", &pairs[0], error, expected.creases);
     if expected.flowing {
         agree("eastward velocity", &pairs[1], error, expected.creases);
@@ -515,6 +541,9 @@ fn motion_dies_out_and_keeps_the_volume(model: &mut dyn WaveModel, expected: Exp
         assert!(speed <= last, "{speed} m/s at {depth} m");
         last = speed;
         if depth <= 2.0 {
+            // Creases aside.
+            divergences.sort_by(|a: &f64, b| a.abs().total_cmp(&b.abs()));
+            divergences.truncate(((1.0 - expected.creases) * divergences.len() as f64) as usize);
             let (sum, scale) = (root_mean_square(&divergences), root_mean_square(&terms));
             let noise = 1e-6 * speed / h;
             assert!(sum <= expected.divergence * scale + noise, "divergence {sum} of {scale} at {depth} m");
@@ -598,6 +627,36 @@ fn peacheys_waves_conform() {
             conforms(&mut waves, expected);
         }
     }
+}
+
+#[test]
+fn tiles_conform() {
+    // Interpolated between samples: slopes err by what the shortest waves leave, and creases lie along the cells.
+    let expected = Expected { error: 0.3, creases: 0.05, divergence: 0.2, ..USUAL };
+    let options = cascades::Options { samples: 64, foam: false, ..cascades::Options::default() };
+    conforms(&mut Cascades::new(&state(f64::INFINITY), &options).expect("a sea"), expected);
+}
+
+#[test]
+fn waves_over_a_bed_conform() {
+    // From a sloping beach to water 16 m deep.
+    let bed = Bed::of(DVec2::ZERO, DVec2::splat(5.0), 120, 140, |p| 0.03 * (p.y - 80.0) + 0.5 * (0.02 * p.x).sin());
+    let bed = bed.expect("a bed");
+    let mut sea = ShoreSea::new(&bed, &SeaState { depth: 18.0, ..state(18.0).turned(0.9) }, 24).expect("a sea");
+    // Outside the surf, in which waves change from node to node.
+    let expected = Expected {
+        middle: DVec2::new(300.0, 430.0),
+        reach: 230.0,
+        error: 0.05,
+        creases: 0.05,
+        divergence: 0.55,
+        curling: true,
+        left: 2e-3,
+        sharpened: 0.4,
+        scatter: 0.2,
+        ..USUAL
+    };
+    conforms(&mut sea, expected);
 }
 
 #[test]

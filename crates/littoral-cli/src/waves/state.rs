@@ -82,8 +82,20 @@ pub fn of_record(record: Record) -> SeaState {
     SeaState { trains: vec![Train::Measured(record.measured)], wind, ..SeaState::CALM }
 }
 
-/// A sea state as typed.
+/// A sea state as typed. One that its water is too shallow for is taken, with a warning.
 pub fn read(spec: &str, talk: &mut Talk) -> Result<SeaState, Failure> {
+    let state = read_any(spec, talk)?;
+    let (height, most) = (state.significant_height(), 0.78 * state.depth);
+    if height > most {
+        let (height, depth) = (tidy(height, 1), tidy(state.depth, 1));
+        talk.warn(format!(
+            "--sea {spec}: waves of {height} m in {depth} m of water would have broken; model=tma has those that are left"
+        ));
+    }
+    Ok(state)
+}
+
+fn read_any(spec: &str, talk: &mut Talk) -> Result<SeaState, Failure> {
     let wrong = |problem: String| Failure::Usage(format!("--sea {spec}: {problem}; correct it"));
     let (mut file, mut chosen, mut rest) = (None, None, Vec::new());
     for word in spec.split(',').map(str::trim) {

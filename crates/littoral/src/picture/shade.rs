@@ -392,7 +392,7 @@ impl Stage<'_> {
         let raised = wet.map_or(0.0, |_| (position.z + self.drop_at(at) - self.level()) as f32);
         let shown = normal_of_slope(ripples.slope);
         if let Some(lake) = self.scene.lakes.filter(|_| wet.is_none()).and_then(|l| l.at(self.scene.land, at)) {
-            return self.lake(ripples, &lake);
+            return Pool { open: self.ground.known(at), ..self.lake(ripples, &lake) };
         }
         // Into the water, to where the bent ray meets the bed.
         let within = if shown.dot(eye) > 0.02 { refract(direction, shown) } else { refract(direction, Vec3::Z) };

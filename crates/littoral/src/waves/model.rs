@@ -42,7 +42,7 @@ pub struct Motion {
     pub slope_y: [f32; BLOCK],
     /// ∂dx/∂X.
     pub dxx: [f32; BLOCK],
-    /// ∂dx/∂Y, which is also ∂dy/∂X: the motion has no curl.
+    /// ∂dx/∂Y, which is also ∂dy/∂X where the motion has no curl, and else the mean of both.
     pub dxy: [f32; BLOCK],
     /// ∂dy/∂Y.
     pub dyy: [f32; BLOCK],

@@ -485,10 +485,9 @@ impl ShoreSea {
 
 impl WaveModel for ShoreSea {
     fn set_time(&mut self, seconds: f64) {
-        self.time = seconds;
-        let seconds = if seconds.is_finite() { seconds } else { 0.0 };
+        self.time = if seconds.is_finite() { seconds } else { 0.0 };
         for (n, component) in self.components.iter().enumerate() {
-            let turns = component.start - component.frequency * seconds;
+            let turns = component.start - component.frequency * self.time;
             self.lanes[n / LANES].now[n % LANES] = turns - turns.floor();
         }
     }

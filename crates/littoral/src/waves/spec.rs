@@ -86,17 +86,17 @@ impl Fields {
         let (key, value) = word.split_once('=').ok_or_else(|| SpecError::Word(word.to_owned()))?;
         let wrong = |expected| SpecError::Value { key: key.to_owned(), value: value.to_owned(), expected };
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| n.is_finite());
-        let some = || number(value).map(Some).ok_or_else(|| wrong("a number"));
+        let some = |expected| number(value).map(Some).ok_or_else(|| wrong(expected));
         match key.trim() {
-            "wind" => self.wind = some()?,
-            "from" => self.from = some()?,
-            "fetch" => self.fetch = some()?,
-            "gamma" => self.gamma = some()?,
-            "hs" => self.hs = some()?,
-            "tp" => self.tp = some()?,
-            "depth" => self.depth = some()?,
-            "beaufort" => self.beaufort = some()?,
-            "douglas" => self.douglas = some()?,
+            "wind" => self.wind = some("m/s, above 0 and at most 120")?,
+            "from" => self.from = some("degrees clockwise from north, 0 to 360")?,
+            "fetch" => self.fetch = some("kilometres, above 0")?,
+            "gamma" => self.gamma = some("a number from 1 to 20")?,
+            "hs" => self.hs = some("metres, from 0 to 100")?,
+            "tp" => self.tp = some("seconds, above 0 and at most 100")?,
+            "depth" => self.depth = some("a number of metres above 0")?,
+            "beaufort" => self.beaufort = some("a number from 0 to 12")?,
+            "douglas" => self.douglas = some("a degree from 0 to 9")?,
             "seed" => self.seed = Some(value.trim().parse().map_err(|_| wrong("a whole number, at least 0"))?),
             "spread" => self.spread = Some(value.trim().to_owned()),
             "model" => {
@@ -258,8 +258,8 @@ mod tests {
     #[test]
     fn what_makes_no_sense_is_named() {
         let error = |line: &str| line.parse::<SeaState>().expect_err(line).to_string();
-        assert_eq!(error("wind=abc"), "`wind=abc`: expected a number");
-        assert_eq!(error("wind=NaN"), "`wind=NaN`: expected a number");
+        assert_eq!(error("wind=abc"), "`wind=abc`: expected m/s, above 0 and at most 120");
+        assert_eq!(error("wind=NaN"), "`wind=NaN`: expected m/s, above 0 and at most 120");
         assert_eq!(error("wind=-4"), "wind: expected m/s, above 0 and at most 120, got -4");
         assert_eq!(error("wind=900"), "wind: expected m/s, above 0 and at most 120, got 900");
         assert_eq!(error("beaufort=13"), "beaufort: expected a number from 0 to 12, got 13");

@@ -231,7 +231,12 @@ impl SeaState {
                 let peak = spectrum.peak;
                 OutOfRange::unless(peak > 1e-3 && peak < 1e3, "peak frequency", "Hz, from 0.001 to 1000", peak)?;
                 let alpha = spectrum.alpha;
-                OutOfRange::unless((0.0..1e3).contains(&alpha), "alpha", "a number, at least 0", alpha)?;
+                OutOfRange::unless(
+                    (0.0..1e3).contains(&alpha),
+                    "alpha",
+                    "a number from 0 to 1000 (lower or longer waves)",
+                    alpha,
+                )?;
             }
         }
         Ok(self)

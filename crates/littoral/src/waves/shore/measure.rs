@@ -206,7 +206,9 @@ fn cell(sea: &ShoreSea, corners: [Option<usize>; 4], [height, slope, curvature]:
     let bend = shape::steepest(r);
     let sideways = greatest(Place::SIDEWAYS);
     let changing = 3.0 * height * (spread(Place::COSINE) + spread(Place::SINE));
+    // Where waves are lower than at other corners their sum is lower, too.
     let least_height = places.iter().map(|p| p.0[Place::HEIGHT]).fold(f32::INFINITY, f32::min);
+    let least_height = least_height.max(0.25 * greatest(Place::HEIGHT));
     let swing = greatest(Place::SWING);
     // As high as it is told to run and no steeper than waves that much higher would be.
     let swash = greatest(Place::SETUP) + shape::FARTHEST * swing;

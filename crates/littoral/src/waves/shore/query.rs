@@ -76,7 +76,8 @@ fn find(sea: &ShoreSea, points: &Points) -> Spots {
         // Off the grid it does not matter how far.
         c[l] = spots.column[l].max(-2.0).min(f64::from(columns)) as i32;
         r[l] = spots.row[l].max(-2.0).min(f64::from(rows)) as i32;
-        let footprint = points.footprint[l] * std::f32::consts::FRAC_1_PI;
+        // Not a number: none.
+        let footprint = points.footprint[l].max(0.0).min(WIDEST) * std::f32::consts::FRAC_1_PI;
         spots.square[l] = footprint * footprint;
     }
     spots.shared = apart == 0;
@@ -92,6 +93,9 @@ fn find(sea: &ShoreSea, points: &Points) -> Spots {
     }
     spots
 }
+
+/// The widest footprint (m): wider than any wave.
+const WIDEST: f32 = 1e9;
 
 /// Cells off the grid that are told apart.
 const FAR: f64 = 1e15;
@@ -483,8 +487,7 @@ pub(super) fn velocity(sea: &ShoreSea, points: &Points, depths: &[f32; BLOCK], v
         if below >= bed {
             continue;
         }
-        let square =
-            (points.footprint[point] / std::f32::consts::PI) * (points.footprint[point] / std::f32::consts::PI);
+        let square = spots.square[point];
         for block in 0..sea.blocks {
             unpack(sea, &spots, point, block, &mut cell);
             let waves = &sea.lanes[block];
