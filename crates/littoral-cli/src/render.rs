@@ -174,6 +174,11 @@ struct Answer {
     datum: String,
     samples: u32,
     seed: u32,
+    /// Significant height of the waves (m), and the instant (s), if there are waves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    hs: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     passes: Option<String>,
 }
@@ -238,6 +243,8 @@ impl Render {
                 datum: subject.datum,
                 samples: self.samples,
                 seed: self.seed,
+                hs: sea.as_ref().map(|_| state.clone().unwrap_or_else(coast::sea_state).significant_height()),
+                time: sea.as_ref().map(Sea::time),
                 passes: passes.map(|p| p.display().to_string()),
             });
         }

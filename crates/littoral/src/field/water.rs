@@ -365,7 +365,7 @@ mod tests {
 
     #[test]
     fn squares_at_the_level_are_unsounded_and_lines_are_a_shore() {
-        let heights = vec![0.0, 0.0, -1.0, 0.0, 2.0, f32::NAN].repeat(3);
+        let heights = [0.0, 0.0, -1.0, 0.0, 2.0, f32::NAN].repeat(3);
         let land = Land::new(Raster::new(6, 3, DVec2::ONE, heights).expect("valid"));
         let water = Water::flood(&land, 0.0).expect("wet in the west");
         let unsounded = |column: usize| water.is_unsounded(&land, 6 + column);
