@@ -5,7 +5,7 @@
 //!   sea=STATE           such as sea=hs=2,tp=9,from=200; words as in littoral's sea states
 //!   depth=M             depth of the open sea (m); by itself that of the seaward edge
 //!   time=S size=1200    longer side of the picture in pixels
-//!   waves=32 swash=0    number of waves; 0 leaves the waterline where still water has it
+//!   waves=32            number of waves
 //!   raw=FILE columns=N rows=N dx=M dy=M    little-endian f32 heights, northern row first
 //! ```
 
@@ -50,7 +50,6 @@ fn main() -> Result<(), Failure> {
     let pixel = extent.max_element() / number("size").unwrap_or(1200.0);
     let (width, height) = ((extent.x / pixel) as u32, (extent.y / pixel) as u32);
     let mut pixels = vec![0u8; (width * height * 3) as usize];
-    let swash = number("swash").unwrap_or(1.0) as f32;
     for row in 0..height {
         for block in 0..width.div_ceil(BLOCK as u32) {
             let mut points = Points::at(0.0, 0.0);
@@ -61,20 +60,17 @@ fn main() -> Result<(), Failure> {
             }
             let mut motion = Motion::STILL;
             sea.add_motion(&points, &mut motion);
-            let mut levels = [0.0; BLOCK];
-            sea.waterline(&points, &mut levels);
-            for (l, swashed) in levels.into_iter().enumerate() {
+            for l in 0..BLOCK {
                 let column = block * BLOCK as u32 + l as u32;
                 if column >= width {
                     break;
                 }
                 let (ground_height, ground_slope) = ground.at(DVec2::new(points.x[l], points.y[l]));
-                let level = swash * swashed;
-                let colour = if ground_height > level.max(motion.dz[l].max(0.0) * swash) && ground_height > -0.3 {
+                let colour = if ground_height > motion.dz[l] {
                     land(ground_height, ground_slope)
                 } else {
                     let slope = Vec2::new(motion.slope_x[l], motion.slope_y[l]);
-                    let depth = (level + motion.dz[l] - ground_height).max(0.0);
+                    let depth = motion.dz[l] - ground_height;
                     water(depth, slope, motion.foam[l])
                 };
                 let at = ((row * width + column) * 3) as usize;

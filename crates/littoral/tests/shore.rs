@@ -491,12 +491,12 @@ fn hostile_beds_and_numbers_do_no_harm() {
                 sea.set_time(time);
                 for (x, y) in [(0.0, 0.0), (45.0, 33.3), (-1e9, 1e9), (f64::NAN, 1.0), (f64::INFINITY, -1e300)] {
                     let points = Points { footprint: [1.0; 16], ..Points::at(x, y) };
-                    let (mut m, mut v, mut w) = (Motion::STILL, Velocity::STILL, [0.0; 16]);
+                    let (mut m, mut v) = (Motion::STILL, Velocity::STILL);
                     sea.add_motion(&points, &mut m);
                     sea.add_velocity(&points, &[0.5; 16], &mut v);
-                    sea.waterline(&points, &mut w);
                     let all =
-                        [m.dx, m.dy, m.dz, m.slope_x, m.slope_y, m.dxx, m.dxy, m.dyy, m.hidden_xx, m.foam, v.x, v.z, w];
+                        [m.dx, m.dy, m.dz, m.slope_x, m.slope_y, m.dxx, m.dxy, m.dyy, m.hidden_xx, m.foam, v.x, v.z];
+                    assert!(sea.run_up(DVec2::new(x, y)).is_finite());
                     assert!(all.iter().flatten().all(|n| n.is_finite()), "{x}, {y} at {time}: {m:?}");
                 }
             }
@@ -541,10 +541,10 @@ fn a_designers_shore_has_its_slope_and_its_surf() {
     let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
     for step in 0..40 {
         sea.set_time(f64::from(step) * 0.8);
-        let mut levels = [0.0; 16];
-        sea.waterline(&Points::at(300.0, 322.0), &mut levels);
-        low = low.min(levels[0]);
-        high = high.max(levels[0]);
+        let mut motion = Motion::STILL;
+        sea.add_displacement(&Points::at(300.0, 322.0), &mut motion);
+        low = low.min(motion.dz[0]);
+        high = high.max(motion.dz[0]);
     }
     println!("waterline from {low} to {high} m");
     assert!(high - low > 0.15 && high < 2.0 && low > -1.0);

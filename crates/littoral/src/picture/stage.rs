@@ -36,7 +36,7 @@ pub struct Stage<'a> {
     pub(super) tints: Tints,
     /// The land's border, where water goes on beyond it.
     pub(super) rim: Option<Rim>,
-    /// Where swash may run, once somebody asks.
+    /// Where swash may run, from the first picture with waves on.
     beach: OnceLock<Option<Beach>>,
 }
 
@@ -106,7 +106,7 @@ impl<'a> Stage<'a> {
     /// Whether waves may wet a place within the raster or beyond: it lies in still water, or on a shore that rises from it.
     pub(super) fn may_be_wet(&self, at: DVec2) -> bool {
         let Some(water) = self.scene.water else { return false };
-        let beach = || self.beach.get_or_init(|| Beach::of(self.scene.land, water)).as_ref();
+        let beach = || self.beach.get().and_then(Option::as_ref);
         water.covers(at) || beach().is_some_and(|beach| beach.covers(self.scene.land, at))
     }
 
@@ -147,6 +147,10 @@ impl<'a> Stage<'a> {
             caster,
             sea: sea.filter(|_| self.scene.water.is_some() && !self.is_map()),
         };
+        // Not by whoever of the tiles asks first: the flood is parallel, and a tile that it lets in meanwhile would wait for itself.
+        if let (Some(water), Some(_), None) = (self.scene.water, lens.sea, self.beach.get()) {
+            let _ = self.beach.set(Beach::of(self.scene.land, water));
+        }
         let tiles = UVec2::new(view.size.x.div_ceil(TILE), view.size.y.div_ceil(TILE));
         let count = tiles.x as usize * tiles.y as usize;
         let patterns = Patterns::new(settings.samples.max(1), settings.seed);

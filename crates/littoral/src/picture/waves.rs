@@ -105,6 +105,7 @@ impl Stage<'_> {
             if let Some(block) = &self.ground.block {
                 // No water beyond the cut.
                 let (enter, leave, _) = block.span(origin(&rays[i]), direction).unwrap_or((0.0, 0.0, Vec3::ZERO));
+                let enter = enter.max(0.0);
                 (at, end) = (at.max(enter), end.min(leave));
                 if origin(&rays[i]).z + direction.z * enter < block.floor {
                     end = 0.0;

@@ -444,12 +444,6 @@ impl ShoreSea {
         Climate { depth: mix(Place::DEPTH), significant_height: mix(Place::HEIGHT), broken: mix(Place::BROKEN) }
     }
 
-    /// How far (m) set-up and swash hold the water's edge above still water near a shore, at points and at the instant the sea stands at: the
-    /// waterline is where the ground has this height. Falls to 0 in deeper water and, some 80 m from it, inland.
-    pub fn waterline(&self, points: &Points, levels: &mut [f32; BLOCK]) {
-        query::swash(self, points, levels);
-    }
-
     /// Amplitude (m) and wave number (rad/m, in the direction in which it runs) of the n-th wave, as the sea was given them, at a place (m).
     ///
     /// # Panics

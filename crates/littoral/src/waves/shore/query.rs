@@ -518,17 +518,3 @@ pub(super) fn velocity(sea: &ShoreSea, points: &Points, depths: &[f32; BLOCK], v
         }
     }
 }
-
-/// How far (m) the swash has raised or lowered the waterline at the points.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-pub(super) fn swash(sea: &ShoreSea, points: &Points, levels: &mut [f32; BLOCK]) {
-    *levels = [0.0; BLOCK];
-    if sea.blocks == 0 {
-        return;
-    }
-    let mut sums = Sums::NONE;
-    add_up::<false>(sea, points, &mut sums);
-    for l in 0..LANES {
-        levels[l] = shape::swash(&sums, l);
-    }
-}
