@@ -1,38 +1,15 @@
 //! The sea that is drawn and the sea that is asked about are one, whatever it is made of and wherever it lies.
 
+mod common;
+
+use common::{fails, json, littoral, text};
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use littoral_data::write::{GridSamples, geotiff};
 use littoral_data::{Crs, Georeference, Registration};
 use serde_json::Value;
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
-
-fn littoral(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_littoral")).args(arguments).output().expect("the command runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("text")
-}
-
-/// Succeeds and prints one JSON object.
-fn json(arguments: &[&str]) -> Value {
-    let mut arguments = arguments.to_vec();
-    arguments.push("--json");
-    let output = littoral(&arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    serde_json::from_slice(&output.stdout).expect("JSON")
-}
-
-fn fails(arguments: &[&str], code: i32, words: &str) {
-    let output = littoral(arguments);
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
-    assert!(output.stdout.is_empty() && !said.contains("panicked"), "{arguments:?}");
-    let plain = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(plain.contains(words), "{arguments:?}: {said} lacks {words}");
-}
+use std::process::{Command, Stdio};
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().expect("an array").iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect()

@@ -1,37 +1,10 @@
 //! `littoral waves` as a script sees it.
 
+mod common;
+
+use common::{fails, json, littoral, text};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn littoral(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_littoral")).args(arguments).output().expect("the command runs")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("text")
-}
-
-/// Succeeds and prints one JSON object.
-fn json(arguments: &[&str]) -> Value {
-    let mut arguments = arguments.to_vec();
-    arguments.push("--json");
-    let output = littoral(&arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
-    let value: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    assert!(value["warnings"].is_array(), "warnings are always listed");
-    value
-}
-
-fn fails(arguments: &[&str], code: i32, words: &str) {
-    let output = littoral(arguments);
-    let said = text(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
-    assert!(output.stdout.is_empty() && !said.contains("panicked"), "{arguments:?}");
-    // Help is wrapped to the width of the terminal.
-    let plain = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(plain.contains(words), "{arguments:?}: {said} lacks {words}");
-}
 
 fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().expect("an array").iter().map(|v| v.as_f64().expect("a number")).collect()

@@ -4,6 +4,9 @@
 //! variable `LITTORAL_MAP` names. Cameras: *low*, 50 m above the ground and looking 5° down; *high*, 3000 m above and 45°
 //! down; both north-east, 60° vertically, 1920 × 1080 pixels. Medians of processor time.
 
+mod clock;
+
+use clock::median;
 use glam::{DVec2, DVec3, Mat3, UVec2, Vec2, Vec3};
 use littoral::field::noise::Fbm;
 use littoral::field::{Land, RangePyramid, Raster};
@@ -146,36 +149,4 @@ fn random(mut state: u64) -> impl FnMut() -> f64 {
         state ^= state << 17;
         (state >> 11) as f64 / (1u64 << 53) as f64
     }
-}
-
-/// Median processor time (s) of some runs.
-fn median(runs: usize, mut work: impl FnMut()) -> f64 {
-    let mut seconds: Vec<f64> = (0..runs)
-        .map(|_| {
-            let begin = processor_time();
-            work();
-            processor_time() - begin
-        })
-        .collect();
-    seconds.sort_by(f64::total_cmp);
-    seconds[runs / 2]
-}
-
-/// Processor time of this process (s), so that others on the machine count less.
-#[cfg(target_os = "linux")]
-fn processor_time() -> f64 {
-    unsafe extern "C" {
-        fn clock_gettime(clock: i32, time: *mut [i64; 2]) -> i32;
-    }
-    let mut time = [0; 2];
-    // SAFETY: two 64-bit numbers are what 64-bit Linux writes there; clock 2 is the process's.
-    unsafe { clock_gettime(2, &mut time) };
-    time[0] as f64 + 1e-9 * time[1] as f64
-}
-
-/// Time by the wall (s), where nothing better is at hand.
-#[cfg(not(target_os = "linux"))]
-fn processor_time() -> f64 {
-    static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }

@@ -3,6 +3,9 @@
 //! The sea is that of S. Liu, X. Xu and C. Chen 2009: 16 × 8 waves of 4 m significant height; the same number drawn from the spectrum, each with
 //! its own heading; and trochoids. Points lie on 200 × 200 m, a metre apart, or all over 100 km. Medians of processor time.
 
+mod clock;
+
+use clock::median;
 use glam::DVec2;
 use littoral::waves::{
     BLOCK, Beach, Grid, GridScratch, Length, Motion, Path, Peachey, PlaneWave, Points, SeaState, Sine, Sines,
@@ -50,7 +53,7 @@ fn main() {
     let bed = beach.depths(DVec2::new(0.0, -2900.0), 5.0, 400, 600).expect("a bed");
     let swell = Swell { amplitude: 0.7, period: 9.0, heading: 1.2, phase: 0.0 };
     for path in [Path::Refracted, Path::Straight] {
-        let made = median(|| drop(black_box(Peachey::new(&bed, &[swell], path, Surf::default()))));
+        let made = median(21, || drop(black_box(Peachey::new(&bed, &[swell], path, Surf::default()))));
         println!("Peachey's phases over 400 × 600 nodes, {path:?}: {:.0} ms a train", made * 1e3);
     }
     let waves = Peachey::new(&bed, &[swell], Path::Refracted, Surf::default()).expect("waves");
@@ -76,38 +79,5 @@ fn motions(model: &dyn WaveModel, places: &[DVec2]) {
 
 /// Million points a second of a function that does all of them.
 fn rate(work: impl FnMut()) -> f64 {
-    (EDGE * EDGE) as f64 * 1e-6 / median(work)
-}
-
-/// Median processor time (s) of some runs.
-fn median(mut work: impl FnMut()) -> f64 {
-    const RUNS: usize = 21;
-    let mut seconds: Vec<f64> = (0..RUNS)
-        .map(|_| {
-            let begin = processor_time();
-            work();
-            processor_time() - begin
-        })
-        .collect();
-    seconds.sort_by(f64::total_cmp);
-    seconds[RUNS / 2]
-}
-
-/// Processor time of this process (s), so that others on the machine count less.
-#[cfg(target_os = "linux")]
-fn processor_time() -> f64 {
-    unsafe extern "C" {
-        fn clock_gettime(clock: i32, time: *mut [i64; 2]) -> i32;
-    }
-    let mut time = [0; 2];
-    // SAFETY: two 64-bit numbers are what 64-bit Linux writes there; clock 2 is the process's.
-    unsafe { clock_gettime(2, &mut time) };
-    time[0] as f64 + 1e-9 * time[1] as f64
-}
-
-/// Time by the wall (s), where nothing better is at hand.
-#[cfg(not(target_os = "linux"))]
-fn processor_time() -> f64 {
-    static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
-    BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
+    (EDGE * EDGE) as f64 * 1e-6 / median(21, work)
 }
