@@ -1,7 +1,7 @@
 //! The sea as a whole: one function for pictures and queries, the same bits in bulk and one by one.
 
 use glam::{DVec2, DVec3, UVec2, Vec3};
-use littoral::field::{HeightField, Land, Raster, Sea, Surface, Water};
+use littoral::field::{HeightField, Land, Raster, Sea, Surface, Water, coast};
 use littoral::picture::{Scene, Settings, Sun, render};
 use littoral::space::{Cell, Datum, Place, View};
 use littoral::waves::{SeaState, StillWater, Superposition, components};
@@ -144,4 +144,8 @@ fn a_bed_takes_every_state() {
         }
     }
     assert!(Sea::over(&land, &water, &SeaState::CALM, &|_| true).expect("calm").height_at(DVec2::ONE) == 0.0);
+    // Where rounding once left waves higher within the bed than outside.
+    let coast = coast::coast();
+    let water = Water::flood(&coast, 0.0).expect("the sea");
+    Sea::over(&coast, &water, &"beaufort=3".parse().expect("a state"), &|_| true).expect("a sea");
 }
