@@ -381,18 +381,11 @@ impl HeightField for Sea {
         Some(self.height_at(world.truncate()) as f32)
     }
 
-    fn range(&self, cell: Cell) -> HeightRange {
+    fn range(&self, _: Cell) -> HeightRange {
+        // The same everywhere: asking the water itself would cost more than a tighter answer saves.
         let level = self.level as f32;
-        // Room for the rounding of level + height.
-        let slack = 1e-6 * (level.abs() + self.bounds.height);
-        let all = self.bounds.height + slack;
-        let size = cell.side() * self.datum.metres_per_uv(cell.centre());
-        let climb = self.steepest() * (0.5 * size.length()) as f32 + slack + Sea::TOLERANCE * self.bounds.slope;
-        if climb >= all {
-            return HeightRange { low: level - all, high: level + all };
-        }
-        let middle = self.height(cell.centre()).unwrap_or(level);
-        HeightRange { low: (middle - climb).max(level - all), high: (middle + climb).min(level + all) }
+        let all = self.bounds.height + 1e-6 * (level.abs() + self.bounds.height);
+        HeightRange { low: level - all, high: level + all }
     }
 
     fn error(&self, cell: Cell) -> f32 {
