@@ -205,7 +205,7 @@ impl Quadtree {
     /// Says how far vertices move.
     fn morph(&mut self, tolerance: f32) {
         for leaf in &mut self.leaves {
-            let left = (tolerance - leaf.own - leaf.seams).max(0.0);
+            let left = (tolerance * (1.0 - 1e-5) - leaf.own - leaf.seams).max(0.0);
             leaf.morph = match leaf.parent {
                 parent if !parent.is_finite() => 0.0,
                 parent if parent <= left => 1.0,
@@ -264,7 +264,7 @@ impl Lod for Quadtree {
                 drawing.patches.push(self.patch(field, leaf));
             }
         }
-        Ok(Reached { pixels, limited: pixels > metric.tolerance() * (1.0 + 1e-5) })
+        Ok(Reached { pixels, limited: pixels > metric.tolerance() })
     }
 }
 
