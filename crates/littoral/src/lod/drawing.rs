@@ -238,7 +238,8 @@ fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
         }
     }
     // A cell exists only whole.
-    let whole = |i: u32, j: u32| [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].iter().all(|&(i, j)| !height(i, j).is_nan());
+    let whole =
+        |i: u32, j: u32| [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].iter().all(|&(i, j)| !height(i, j).is_nan());
     // Odd vertices of a side whose neighbour lacks them are replaced by the even ones before them, so that of three triangles at the side two
     // remain. Where one of the two cells there is missing, the vertex stays, and a triangle that stands upright closes the gap.
     let [south, east, north, west] = patch.edges.map(|edge| edge.coarser);
@@ -343,9 +344,8 @@ mod tests {
                     (at(&b) - at(&a)).perp_dot(at(v) - at(&a)) / area,
                 );
                 if wb >= 0.0 && wc >= 0.0 && wb + wc <= 1.0 {
-                    let plane = f64::from(a.height) * (1.0 - wb - wc)
-                        + f64::from(b.height) * wb
-                        + f64::from(c.height) * wc;
+                    let plane =
+                        f64::from(a.height) * (1.0 - wb - wc) + f64::from(b.height) * wb + f64::from(c.height) * wc;
                     assert!((plane - f64::from(v.height)).abs() < 1e-4, "{v:?} off {plane}");
                     found = true;
                 }

@@ -162,12 +162,7 @@ impl Half {
         let far = self.far;
         let corner = if far { ne } else { sw };
         // One at the right angle, one at each end, and one between, turned round.
-        [
-            Half { cell: corner, far },
-            Half { cell: se, far },
-            Half { cell: nw, far },
-            Half { cell: corner, far: !far },
-        ]
+        [Half { cell: corner, far }, Half { cell: se, far }, Half { cell: nw, far }, Half { cell: corner, far: !far }]
     }
 
     /// The cells beyond the horizontal and the vertical leg; `None` where the face ends.
@@ -180,10 +175,7 @@ impl Half {
                 (cell.x < last).then(|| Cell { x: cell.x + 1, ..cell }),
             ]
         } else {
-            [
-                cell.y.checked_sub(1).map(|y| Cell { y, ..cell }),
-                cell.x.checked_sub(1).map(|x| Cell { x, ..cell }),
-            ]
+            [cell.y.checked_sub(1).map(|y| Cell { y, ..cell }), cell.x.checked_sub(1).map(|x| Cell { x, ..cell })]
         }
     }
 

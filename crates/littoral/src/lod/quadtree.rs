@@ -86,7 +86,9 @@ impl Quadtree {
         let deepest = self.limits.finest.min(Cell::MAX_LEVEL).saturating_sub(DEPTH);
         let wants = |cell: Cell| {
             cell.level < deepest
-                && metric.cell(field, cell, field.stencil_error(cell, DEPTH)).is_some_and(|(_, pixels)| pixels > tolerance)
+                && metric
+                    .cell(field, cell, field.stencil_error(cell, DEPTH))
+                    .is_some_and(|(_, pixels)| pixels > tolerance)
         };
         if wants(Cell::face(0)) {
             self.mark(Cell::face(0));
@@ -166,7 +168,9 @@ impl Quadtree {
             let Leaf { cell, own, .. } = self.leaves[i];
             let mut seams = 0.0f32;
             for (side, &by) in SIDES.iter().enumerate() {
-                let Some(beyond) = neighbour(cell, by).filter(|&beyond| self.is_coarser(field, beyond)) else { continue };
+                let Some(beyond) = neighbour(cell, by).filter(|&beyond| self.is_coarser(field, beyond)) else {
+                    continue;
+                };
                 let off = self.seam(field, cell, side);
                 let bounds = metric.bounds(cell, field.range(cell));
                 let pixels = off * metric.pixels_per_metre(&bounds);
