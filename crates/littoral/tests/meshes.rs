@@ -34,7 +34,8 @@ fn mesh(lod: &mut dyn Lod, field: &dyn HeightField, tolerance: f32) -> Mesh {
 /// Mean difference of two pictures as a share of the mean light of the first.
 fn difference(a: &Picture, b: &Picture) -> f64 {
     let light: f64 = a.radiance.iter().flatten().map(|v| f64::from(*v)).sum();
-    let off: f64 = a.radiance.iter().flatten().zip(b.radiance.iter().flatten()).map(|(a, b)| f64::from((a - b).abs())).sum();
+    let off: f64 =
+        a.radiance.iter().flatten().zip(b.radiance.iter().flatten()).map(|(a, b)| f64::from((a - b).abs())).sum();
     off / light
 }
 
