@@ -1,0 +1,81 @@
+//! A waterline cut into a mesh: where it crosses a level, triangles are parted along it.
+//!
+//! A cut keeps to the plane of its triangle, so that the surface is the same as before in every point, and with it
+//! every bound of its error. Two triangles share the cut of their common edge. The line is the border of what lies
+//! *above* the level: a sea that is flat at it belongs to the water.
+
+use glam::{DVec2, DVec3};
+use std::cmp::Ordering;
+use std::collections::HashMap;
+
+/// Parts triangles where they cross `level`; positions are columns, rows and heights, `spacing` (m) apart. Answers with
+/// the edges of the line, higher ground on their left.
+pub(super) fn cut(
+    positions: &mut Vec<DVec3>,
+    triangles: &mut Vec<[u32; 3]>,
+    spacing: DVec2,
+    level: f64,
+) -> Vec<[u32; 2]> {
+    let mut side: Vec<Ordering> = positions.iter().map(|at| at.z.total_cmp(&level)).collect();
+    let mut cuts = HashMap::new();
+    let mut parted = Vec::with_capacity(triangles.len());
+    for &triangle in triangles.iter() {
+        let sides = triangle.map(|vertex| side[vertex as usize]);
+        if !(sides.contains(&Ordering::Less) && sides.contains(&Ordering::Greater)) {
+            parted.push(triangle);
+            continue;
+        }
+        // Turned so that the first corner is alone on its side, or between the two others.
+        let lone = (0..3).find(|&corner| {
+            let (here, next, before) = (sides[corner], sides[(corner + 1) % 3], sides[(corner + 2) % 3]);
+            if here == Ordering::Equal { true } else { here != next && here != before && next == before }
+        });
+        let lone = lone.unwrap_or(0);
+        let [a, b, c] = [0, 1, 2].map(|corner| triangle[(corner + lone) % 3]);
+        let mut between = |from: u32, to: u32| {
+            let (low, high) = (from.min(to), from.max(to));
+            *cuts.entry((low, high)).or_insert_with(|| {
+                let (p, q) = (positions[low as usize], positions[high as usize]);
+                let part = (level - p.z) / (q.z - p.z);
+                positions.push(p.truncate().lerp(q.truncate(), part).extend(level));
+                side.push(Ordering::Equal);
+                positions.len() as u32 - 1
+            })
+        };
+        if sides[lone] == Ordering::Equal {
+            let across = between(b, c);
+            parted.extend([[a, b, across], [a, across, c]]);
+            continue;
+        }
+        let (right, left) = (between(a, b), between(c, a));
+        parted.push([a, right, left]);
+        // What is left has four corners: parted along its shorter diagonal.
+        let length = |from: u32, to: u32| {
+            let step = (positions[to as usize] - positions[from as usize]).truncate() * spacing;
+            step.length_squared()
+        };
+        if length(right, c) <= length(left, b) {
+            parted.extend([[right, b, c], [right, c, left]]);
+        } else {
+            parted.extend([[right, b, left], [b, c, left]]);
+        }
+    }
+    *triangles = parted;
+    line(triangles, &side)
+}
+
+/// The edges at the level between a triangle above it and one that is not.
+fn line(triangles: &[[u32; 3]], side: &[Ordering]) -> Vec<[u32; 2]> {
+    let (mut above, mut other) = (Vec::new(), Vec::new());
+    for &[a, b, c] in triangles {
+        let high = [a, b, c].iter().any(|&vertex| side[vertex as usize] == Ordering::Greater);
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            if [from, to].iter().all(|&vertex| side[vertex as usize] == Ordering::Equal) {
+                if high { above.push([from, to]) } else { other.push([to, from]) }
+            }
+        }
+    }
+    other.sort_unstable();
+    above.retain(|edge| other.binary_search(edge).is_ok());
+    above
+}
