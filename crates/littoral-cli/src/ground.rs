@@ -1,7 +1,7 @@
 //! A height file as ground to stand on, in the file's coordinates and in local metres.
 
 use crate::talk::{Failure, Talk, progress, tidy};
-use glam::{DAffine2, DVec2};
+use glam::{DAffine2, DVec2, DVec3};
 use littoral::field::{Land, Raster, Window};
 use littoral_data::{Code, Crs, Dem, Encoding, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
 use std::path::{Path, PathBuf};
@@ -160,6 +160,23 @@ impl Opened {
         Window { column: low.x as usize, row: low.y as usize, columns: size.x as usize, rows: size.y as usize }
     }
 
+    /// The window of all samples in the rectangle between two local positions; `None` if there are not 2 × 2.
+    pub fn samples_between(&self, a: DVec2, b: DVec2) -> Option<Window> {
+        /// As much of a cell as typed decimals may leave a corner off its sample.
+        const SLACK: f64 = 1e-6;
+        let samples = self.frame.local_from_sample.inverse();
+        let (a, b) = (samples.transform_point2(a), samples.transform_point2(b));
+        let low = (a.min(b) - SLACK).ceil().max(DVec2::ZERO);
+        let high = (a.max(b) + SLACK).floor().min(self.frame.last());
+        let size = high - low + 1.0;
+        (size.min_element() >= 2.0).then_some(Window {
+            column: low.x as usize,
+            row: low.y as usize,
+            columns: size.x as usize,
+            rows: size.y as usize,
+        })
+    }
+
     /// A failure with the file's name.
     pub fn failure(&self, problem: &str) -> Failure {
         Failure::Work(format!("{}: {problem}", self.file.display()))
@@ -254,6 +271,27 @@ impl Frame {
     /// The file's coordinates of local metres.
     pub fn crs(&self, local: DVec2) -> DVec2 {
         self.crs_from_local.transform_point2(local)
+    }
+
+    /// The file's coordinates of column and row of land in this frame, which count from its south-western sample.
+    pub fn crs_from_lattice(&self, land: &Land) -> DAffine2 {
+        let [columns, rows] = self.georeference.flips().map(|against| if against { -1.0 } else { 1.0 });
+        let corner = self.local_from_sample.inverse().transform_point2(land.origin()).round();
+        let sample_from_lattice = DAffine2::from_scale_angle_translation(DVec2::new(columns, rows), 0.0, corner);
+        self.georeference.crs_from_sample() * sample_from_lattice
+    }
+
+    /// Whether something says where the file lies: if not, its coordinates count pixels, southward.
+    pub fn is_placed(&self) -> bool {
+        !self.georeference.y_south
+    }
+
+    /// Replaces the file's coordinates X and Y by longitude and latitude (degrees).
+    pub fn to_lonlat(&self, positions: &mut [DVec3]) -> Result<(), String> {
+        let mut places: Vec<DVec2> = positions.iter().map(|at| at.truncate()).collect();
+        self.georeference.lonlats_from_crs(&mut places)?;
+        positions.iter_mut().zip(places).for_each(|(at, place)| *at = place.extend(at.z));
+        Ok(())
     }
 
     /// Whether a local position lies within the samples, but for rounding.
