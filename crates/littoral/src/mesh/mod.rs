@@ -11,6 +11,9 @@ mod shoreline;
 use edges::Edges;
 pub use model::{Form, Model, ModelError};
 
+pub mod measure;
+pub mod rtin;
+
 /// Triangles over samples of a raster.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Triangulation {
@@ -18,4 +21,58 @@ pub struct Triangulation {
     pub vertices: Vec<[u32; 2]>,
     /// Three vertices each, counter-clockwise seen from above.
     pub triangles: Vec<[u32; 3]>,
+}
+
+impl Triangulation {
+    /// Column and row of the corners of a triangle.
+    #[inline]
+    pub fn corners(&self, triangle: [u32; 3]) -> [[u32; 2]; 3] {
+        triangle.map(|vertex| self.vertices[vertex as usize])
+    }
+}
+
+/// Why there is no mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// The greatest error asked for is no distance.
+    #[error("expected a greatest error of 0 or more (m), got {0}")]
+    Tolerance(f32),
+    /// What was prepared for one raster does not fit another.
+    #[error("expected the raster of {expected:?} samples that this was prepared for, got one of {got:?}")]
+    OtherRaster {
+        /// Columns and rows it was prepared for.
+        expected: [usize; 2],
+        /// Columns and rows given.
+        got: [usize; 2],
+    },
+    /// Vertices are numbered with 32 bits.
+    #[error("expected at most 2³² − 1 vertices; ask for a greater error or for a part of the raster")]
+    TooMany,
+    /// Whoever was told of the progress said to stop.
+    #[error("stopped when asked to")]
+    Stopped,
+}
+
+/// A greatest error (m) that can be kept.
+pub(crate) fn tolerance(max_error: f32) -> Result<f32, MeshError> {
+    // No raster differs by more from anything than what is the greatest number.
+    if max_error >= 0.0 { Ok(max_error.min(f32::MAX)) } else { Err(MeshError::Tolerance(max_error)) }
+}
+
+impl Triangulation {
+    /// Takes away vertices that no triangle names.
+    pub(crate) fn drop_unused(&mut self) {
+        let mut names = vec![u32::MAX; self.vertices.len()];
+        self.triangles.iter().flatten().for_each(|&vertex| names[vertex as usize] = 0);
+        let mut kept = 0;
+        for (name, vertex) in names.iter_mut().zip(0..) {
+            if *name == 0 {
+                *name = kept;
+                self.vertices[kept as usize] = self.vertices[vertex as usize];
+                kept += 1;
+            }
+        }
+        self.vertices.truncate(kept as usize);
+        self.triangles.iter_mut().flatten().for_each(|vertex| *vertex = names[*vertex as usize]);
+    }
 }

@@ -1,0 +1,237 @@
+//! Meshes of whole rasters: each patch covered exactly once, and no sample farther away than was asked for.
+
+use glam::DVec2;
+use littoral::field::Raster;
+use littoral::mesh::measure::{Flaw, measure, verify};
+use littoral::mesh::rtin::Rtin;
+use littoral::mesh::{MeshError, Triangulation};
+use proptest::prelude::*;
+
+/// How many random cases a property is tried on.
+fn cases(few: u32) -> ProptestConfig {
+    let cases = std::env::var("LITTORAL_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(few);
+    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+}
+
+/// Uniform numbers in [0, 1) (xorshift).
+fn random(seed: u64) -> impl FnMut() -> f32 {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 40) as f32 / 16_777_216.0
+    }
+}
+
+/// Kinds of ground that break meshes in different ways.
+#[derive(Clone, Copy, Debug)]
+enum Ground {
+    Flat,
+    Slope,
+    Hills,
+    Noise,
+    Whole,
+    Spikes,
+    Huge,
+    Tiny,
+}
+
+/// Where there is none.
+#[derive(Clone, Copy, Debug)]
+enum Gaps {
+    None,
+    Few,
+    Many,
+    Block,
+    Wedge,
+    All,
+}
+
+fn heights(columns: usize, rows: usize, ground: Ground, gaps: Gaps, seed: u64) -> Vec<f32> {
+    let mut random = random(seed);
+    let [a, b, c] = [0; 3].map(|_| random());
+    let (cx, cy) = ((random() * columns as f32) as usize, (random() * rows as f32) as usize);
+    (0..columns * rows)
+        .map(|i| {
+            let (x, y) = (i % columns, i / columns);
+            let gap = match gaps {
+                Gaps::None => false,
+                Gaps::Few => random() < 0.01,
+                Gaps::Many => random() < 0.3,
+                Gaps::Block => x.abs_diff(cx) < columns / 4 && y.abs_diff(cy) < rows / 4,
+                Gaps::Wedge => (x as f32) * a + (y as f32) * (b - 0.5) > columns as f32 * 0.5 * c,
+                Gaps::All => true,
+            };
+            if gap {
+                return f32::NAN;
+            }
+            let (u, v) = (x as f32, y as f32);
+            match ground {
+                Ground::Flat => 100.1 * a,
+                Ground::Slope => (u * (8.0 * b).floor() + v * (8.0 * c).floor()) * 0.25 + 1000.0,
+                Ground::Hills => 300.0 + 40.0 * (u * (0.1 + 0.2 * a)).sin() * (v * (0.1 + 0.2 * b)).cos() + random(),
+                Ground::Noise => 100.0 * random(),
+                Ground::Whole => (30.0 * random()).floor(),
+                Ground::Spikes => {
+                    if random() < 0.02 {
+                        5000.0
+                    } else {
+                        (u * 0.2).sin()
+                    }
+                }
+                Ground::Huge => (random() - 0.5) * f32::MAX * 1.9,
+                Ground::Tiny => random() * 1e-40,
+            }
+        })
+        .collect()
+}
+
+fn raster(columns: usize, rows: usize, ground: Ground, gaps: Gaps, seed: u64) -> Raster {
+    Raster::new(columns, rows, DVec2::ONE, heights(columns, rows, ground, gaps, seed)).expect("a raster")
+}
+
+/// What a raster is made of: short to print when a case fails.
+#[derive(Clone, Copy, Debug)]
+struct Recipe {
+    columns: usize,
+    rows: usize,
+    ground: Ground,
+    gaps: Gaps,
+    seed: u64,
+}
+
+impl Recipe {
+    fn make(self) -> Raster {
+        raster(self.columns, self.rows, self.ground, self.gaps, self.seed)
+    }
+}
+
+prop_compose! {
+    fn recipes()(
+        columns in 2usize..71, rows in 2usize..71, seed: u64,
+        ground in prop_oneof![
+            Just(Ground::Flat), Just(Ground::Slope), Just(Ground::Hills), Just(Ground::Noise),
+            Just(Ground::Whole), Just(Ground::Spikes), Just(Ground::Huge), Just(Ground::Tiny),
+        ],
+        gaps in prop_oneof![
+            4 => Just(Gaps::None), 1 => Just(Gaps::Few), 1 => Just(Gaps::Many), 1 => Just(Gaps::Block),
+            1 => Just(Gaps::Wedge), 1 => Just(Gaps::All),
+        ],
+    ) -> Recipe {
+        Recipe { columns, rows, ground, gaps, seed }
+    }
+}
+
+/// Errors to ask for, as shares of the range of heights, or as they are.
+fn errors() -> impl Strategy<Value = (bool, f32)> {
+    prop_oneof![
+        Just((false, 0.0)),
+        Just((false, 1e-6)),
+        Just((false, f32::INFINITY)),
+        Just((false, 1e-41)),
+        (0f32..0.6).prop_map(|share| (true, share)),
+        (0f32..50.0).prop_map(|error| (false, error)),
+    ]
+}
+
+fn asked(raster: &Raster, (share, error): (bool, f32)) -> f32 {
+    let range = raster.range();
+    if share && !range.is_empty() { (error * range.high - error * range.low).min(f32::MAX) } else { error }
+}
+
+/// Everything that is promised of every mesh.
+fn check(raster: &Raster, mesh: &Triangulation, max_error: f32) {
+    assert_eq!(verify(raster, mesh), Ok(()));
+    let measured = measure(raster, mesh);
+    assert_eq!((measured.missed, measured.void_covered), (0, 0));
+    let brute = brute_force(raster, mesh);
+    assert!(measured.max_error <= f64::from(max_error), "asked {max_error}, got {measured:?}");
+    let range = raster.range();
+    let rounding = if range.is_empty() { 0.0 } else { 1e-12 * f64::from(range.high.abs().max(range.low.abs())) };
+    assert!((brute - measured.max_error).abs() <= 1e-9 * brute + rounding, "{brute} is not {measured:?}");
+    let mut used = vec![false; mesh.vertices.len()];
+    mesh.triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
+    assert!(used.iter().all(|used| *used), "a vertex without a triangle");
+}
+
+/// The greatest error at a sample: every sample in the box around every triangle, by its definition.
+fn brute_force(raster: &Raster, mesh: &Triangulation) -> f64 {
+    let mut worst = 0f64;
+    for triangle in &mesh.triangles {
+        let corners = mesh.corners(*triangle).map(|at| at.map(i64::from));
+        let [a, b, c] = corners;
+        let cross =
+            |a: [i64; 2], b: [i64; 2], c: [i64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        let height = |at: [i64; 2]| f64::from(raster.heights()[at[1] as usize * raster.columns() + at[0] as usize]);
+        let bounds = |axis: usize| {
+            let along = corners.map(|at| at[axis]);
+            along.into_iter().min().expect("three")..=along.into_iter().max().expect("three")
+        };
+        for y in bounds(1) {
+            for x in bounds(0) {
+                let p = [x, y];
+                let weights = [cross(b, c, p), cross(c, a, p), cross(a, b, p)];
+                if weights.iter().all(|weight| *weight >= 0) {
+                    let area = cross(a, b, c) as f64;
+                    let plane = weights.iter().zip(corners).map(|(w, at)| *w as f64 / area * height(at)).sum::<f64>();
+                    worst = worst.max((plane - height(p)).abs());
+                }
+            }
+        }
+    }
+    worst
+}
+
+proptest! {
+    #![proptest_config(cases(400))]
+
+    #[test]
+    fn rtin_covers_once_and_keeps_its_error(recipe in recipes(), error in errors(), other in errors()) {
+        let raster = recipe.make();
+        let rtin = Rtin::new(&raster);
+        let mut mesh = Triangulation::default();
+        for error in [error, other] {
+            let error = asked(&raster, error);
+            rtin.extract(&raster, error, &mut mesh).expect("a mesh");
+            check(&raster, &mesh, error);
+        }
+    }
+}
+
+#[test]
+fn errors_that_are_no_distance_are_refused() {
+    let raster = raster(5, 4, Ground::Hills, Gaps::None, 1);
+    let rtin = Rtin::new(&raster);
+    for error in [-1.0, f32::NAN, f32::NEG_INFINITY] {
+        let told = rtin.extract(&raster, error, &mut Triangulation::default()).expect_err("no distance").to_string();
+        assert!(told.contains("expected a greatest error of 0 or more"), "{told}");
+    }
+    let other = self::raster(4, 5, Ground::Hills, Gaps::None, 1);
+    let told = rtin.extract(&other, 1.0, &mut Triangulation::default());
+    assert_eq!(told, Err(MeshError::OtherRaster { expected: [5, 4], got: [4, 5] }));
+}
+
+#[test]
+fn what_is_no_mesh_of_a_raster_is_told() {
+    let raster = raster(3, 3, Ground::Flat, Gaps::None, 1);
+    let of = |vertices: &[[u32; 2]], triangles: &[[u32; 3]]| {
+        verify(&raster, &Triangulation { vertices: vertices.to_vec(), triangles: triangles.to_vec() })
+    };
+    let corners = [[0, 0], [2, 0], [2, 2], [0, 2], [1, 1], [1, 1], [3, 0], [1, 0]];
+    assert_eq!(of(&corners[..4], &[[0, 1, 2], [0, 2, 3]]), Ok(()));
+    assert_eq!(of(&corners[..4], &[[0, 1, 2]]), Err(Flaw::Open([[2, 2], [0, 0]])));
+    assert_eq!(of(&corners[..4], &[]), Err(Flaw::Missing([0, 0], [1, 0])));
+    assert_eq!(of(&corners[..4], &[[0, 2, 1], [0, 2, 3]]), Err(Flaw::Turned([[0, 0], [2, 2], [2, 0]])));
+    assert_eq!(of(&corners[..4], &[[0, 1, 2], [0, 2, 3], [0, 1, 3]]), Err(Flaw::Overlap([[0, 0], [2, 0]])));
+    assert_eq!(of(&corners[..4], &[[0, 1, 9]]), Err(Flaw::Nowhere([0, 1, 9])));
+    assert_eq!(of(&corners[..7], &[[0, 1, 6]]), Err(Flaw::Nowhere([0, 1, 6])));
+    assert_eq!(of(&corners[..6], &[[0, 1, 2], [0, 2, 3]]), Err(Flaw::Twice([1, 1])));
+    // The middle of the diagonal is a vertex on one side only.
+    assert_eq!(of(&corners[..5], &[[0, 1, 4], [1, 2, 4], [0, 2, 3]]), Err(Flaw::Open([[0, 0], [2, 2]])));
+    let holed = Raster::new(3, 3, DVec2::ONE, [1.0; 8].into_iter().chain([f32::NAN]).collect()).expect("a raster");
+    let whole = Triangulation { vertices: corners[..4].to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] };
+    assert!(matches!(verify(&holed, &whole), Err(Flaw::Open(_))));
+    let measured = measure(&holed, &whole);
+    assert_eq!((measured.covered, measured.missed, measured.void_covered), (9, 0, 1));
+}
