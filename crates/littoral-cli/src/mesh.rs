@@ -7,7 +7,8 @@ use crate::render::check_output;
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use glam::{DAffine2, DVec2, DVec4};
 use littoral::field::{Land, coast};
-use littoral::mesh::{Form, Model, Triangulation};
+use littoral::mesh::measure::measure;
+use littoral::mesh::{Form, Model, Triangulation, rtin};
 use littoral_data::write::{self, MeshFormat};
 use littoral_data::{Crs, name_of_all};
 use serde::Serialize;
@@ -43,7 +44,7 @@ pub struct Mesh {
     #[arg(long, short, value_name = "FILE", default_value = "littoral.ply")]
     out: PathBuf,
     /// How triangles are chosen
-    #[arg(long, value_enum, value_name = "METHOD", default_value = "tin")]
+    #[arg(long, value_enum, value_name = "METHOD", default_value = "rtin")]
     method: Method,
     /// The mesh is nowhere farther above or below a sample than this (metres) [default: a two-hundredth of the relief]
     #[arg(long, value_name = "METRES", value_parser = max_error)]
@@ -173,8 +174,11 @@ impl Mesh {
         }
 
         let mesh = self.triangles(&ground, asked)?;
-        struct Measured { max_error: f64 }
-        let measured = Measured { max_error: 0.0 };
+        let measured = measure(raster, &mesh);
+        if measured.max_error > asked || measured.missed + measured.void_covered > 0 {
+            let problem = format!("expected a mesh within {asked} m, got {measured:?}; please report it with the file");
+            return Err(failure(&problem));
+        }
         let coordinates = self.coordinates(&ground, talk);
         let place = ground.place(coordinates);
         let to = |at: DVec2| place.transform_point2(at);
@@ -255,25 +259,19 @@ impl Mesh {
 
     fn triangles(&self, ground: &Ground, asked: f64) -> Result<Triangulation, Failure> {
         let raster = ground.land.raster();
-        let mut mesh = Triangulation::default();
-        let mut number = vec![u32::MAX; raster.heights().len()];
-        for row in 0..raster.rows() - 1 {
-            for column in 0..raster.columns() - 1 {
-                if ground.land.corners(column, row).is_none() { continue; }
-                let corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| {
-                    let index = (row + j) * raster.columns() + column + i;
-                    if number[index] == u32::MAX {
-                        number[index] = mesh.vertices.len() as u32;
-                        mesh.vertices.push([(column + i) as u32, (row + j) as u32]);
-                    }
-                    number[index]
-                });
-                let [a, b, c, d] = corners;
-                mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        // Heights are single precision; the bound must not grow by being so.
+        let single = asked as f32;
+        let single = if f64::from(single) > asked { single.next_down() } else { single };
+        let bar = progress(1000, "meshing");
+        let made = match self.method {
+            Method::Rtin => {
+                let mut mesh = Triangulation::default();
+                rtin::Rtin::new(raster).extract(raster, single, &mut mesh).map(|()| mesh)
             }
-        }
-        let _ = asked;
-        Ok(mesh)
+            Method::Tin => return Err(Failure::Usage("expected --method rtin, got tin, which is still to come".into())),
+        };
+        bar.finish_and_clear();
+        made.map_err(|error| Failure::Work(format!("{}: {error}", ground.name)))
     }
 
     /// The height of a base that nobody chose: below the ground by a fiftieth of the longer side as it will look.
