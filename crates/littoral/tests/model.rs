@@ -120,6 +120,9 @@ proptest! {
         prop_assert!(model.volume() > 0.0);
         prop_assert!((model.volume() - volume).abs() <= 0.02 * volume, "{} {volume}", model.volume());
         prop_assert_eq!(model.normals.len() + mesh_bottom(&model), model.positions.len());
+        // No vertex below but for walls: each stands under one of the border.
+        let walls = model.triangles[model.ground_triangles..].iter().filter(|t| t.iter().any(|&v| (v as usize) < model.normals.len()));
+        prop_assert_eq!(walls.count(), 2 * mesh_bottom(&model));
     }
 
     #[test]

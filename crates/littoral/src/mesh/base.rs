@@ -1,10 +1,15 @@
 //! A base: walls along every border of a mesh, voids' borders too, and a flat bottom.
 //!
+//! The bottom needs no vertices but those below the border: it is the constrained Delaunay triangulation of the outline (L.
+//! Chew, "Constrained Delaunay triangulations", 1989; the crate `spade`).
+//!
 //! Ground that meets itself in a single vertex, as between voids that touch at a corner, would make a wall edge between four triangles.
 //! Such a vertex is parted first: each fan of triangles round it gets one of its own, a little within the fan.
 
 use super::{Edges, Model, ModelError};
 use glam::{DVec2, DVec3};
+use spade::handles::FixedVertexHandle;
+use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use std::collections::HashMap;
 
 /// How far parted vertices move apart, in cells: nothing on a print, and far more than rounding to `f32` can undo.
@@ -18,18 +23,61 @@ pub(super) fn close(model: &mut Model, base: f64) -> Result<(), ModelError> {
     }
     part_pinches(model);
     let ground = model.positions.len();
-    if u32::try_from(2 * ground.max(model.triangles.len())).is_err() {
+    let border = Edges::new(ground, &model.triangles).border();
+    let (below, bottom) = match outlined(&model.positions, &border) {
+        Some(found) => found,
+        // The ground itself from below: more triangles, but right whatever the outline is like.
+        None => ((0..ground as u32).collect(), model.triangles.iter().map(|&[a, b, c]| [c, b, a]).collect()),
+    };
+    let count = border.len() * 2 + bottom.len() + model.triangles.len();
+    if u32::try_from(count.max(ground + below.len())).is_err() {
         return Err(ModelError::TooLarge);
     }
-    let border = Edges::new(ground, &model.triangles).border();
-    let below = |vertex: u32| vertex + ground as u32;
-    model.positions.extend_from_within(..);
-    model.positions[ground..].iter_mut().for_each(|at| at.z = base);
-    let walls = border.iter().flat_map(|&[a, b]| [[b, a, below(a)], [b, below(a), below(b)]]);
-    let bottom: Vec<[u32; 3]> = model.triangles.iter().map(|&[a, b, c]| [below(c), below(b), below(a)]).collect();
-    model.triangles.extend(walls);
-    model.triangles.extend(bottom);
+    let mut names = vec![u32::MAX; ground];
+    for (name, &above) in (ground as u32..).zip(&below) {
+        names[above as usize] = name;
+        model.positions.push(model.positions[above as usize].with_z(base));
+    }
+    let name = |vertex: u32| names[vertex as usize];
+    model.triangles.extend(border.iter().flat_map(|&[a, b]| [[b, a, name(a)], [b, name(a), name(b)]]));
+    model.triangles.extend(bottom.iter().map(|triangle| triangle.map(name)));
     Ok(())
+}
+
+/// The vertices of an outline, whose edges have the inside on their left, and triangles over it, clockwise seen from
+/// above; `None` if it crosses or touches itself.
+fn outlined(positions: &[DVec3], border: &[[u32; 2]]) -> Option<(Vec<u32>, Vec<[u32; 3]>)> {
+    let mut vertices = border.as_flattened().to_vec();
+    vertices.sort_unstable();
+    vertices.dedup();
+    let number = |vertex: u32| vertices.binary_search(&vertex).unwrap_or_default();
+    let places = vertices.iter().map(|&vertex| positions[vertex as usize]).map(|at| Point2::new(at.x, at.y));
+    let edges = border.iter().map(|edge| edge.map(number)).collect();
+    let mut crossed = false;
+    let net = ConstrainedDelaunayTriangulation::<Point2<f64>>::try_bulk_load_cdt(places.collect(), edges, |_| crossed = true);
+    let net = net.ok().filter(|net| !crossed && net.num_vertices() == vertices.len())?;
+    // From the border inward, never across it.
+    let mut inside = vec![false; net.num_all_faces()];
+    let mut next = Vec::new();
+    for &[from, to] in border {
+        let [from, to] = [from, to].map(|vertex| FixedVertexHandle::from_index(number(vertex)));
+        let edge = net.get_edge_from_neighbors(from, to)?;
+        next.extend(edge.face().as_inner());
+    }
+    let mut bottom = Vec::new();
+    while let Some(face) = next.pop() {
+        if std::mem::replace(&mut inside[face.index()], true) {
+            continue;
+        }
+        let [a, b, c] = face.vertices().map(|vertex| vertices[vertex.index()]);
+        bottom.push([c, b, a]);
+        for edge in face.adjacent_edges() {
+            if !edge.is_constraint_edge() {
+                next.extend(edge.rev().face().as_inner());
+            }
+        }
+    }
+    Some((vertices, bottom))
 }
 
 /// Gives each fan of triangles round a vertex a vertex of its own.
