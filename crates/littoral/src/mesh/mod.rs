@@ -5,6 +5,7 @@
 
 pub mod measure;
 pub mod rtin;
+pub mod tin;
 
 /// Triangles over samples of a raster.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
