@@ -2,9 +2,9 @@
 
 use glam::DVec2;
 use littoral::field::Raster;
-use littoral::mesh::measure::{Flaw, measure, verify};
+use littoral::mesh::measure::{Flaw, measure, verify, verify_delaunay};
 use littoral::mesh::rtin::Rtin;
-use littoral::mesh::{MeshError, Triangulation};
+use littoral::mesh::{MeshError, Triangulation, tin};
 use proptest::prelude::*;
 
 /// How many random cases a property is tried on.
@@ -196,6 +196,19 @@ proptest! {
             rtin.extract(&raster, error, &mut mesh).expect("a mesh");
             check(&raster, &mesh, error);
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(400))]
+
+    #[test]
+    fn tin_covers_once_keeps_its_error_and_is_delaunay(recipe in recipes(), error in errors()) {
+        let raster = recipe.make();
+        let error = asked(&raster, error);
+        let mesh = tin::triangulate(&raster, error, &|_| true).expect("a mesh");
+        check(&raster, &mesh, error);
+        assert_eq!(verify_delaunay(&raster, &mesh), Ok(()));
     }
 }
 

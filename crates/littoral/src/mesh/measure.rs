@@ -7,7 +7,7 @@
 
 mod scan;
 
-pub(crate) use scan::{Exactness, deviation, spans};
+pub(crate) use scan::{Exactness, Plane, deviation, spans};
 
 use super::Triangulation;
 use crate::field::Raster;
@@ -46,7 +46,7 @@ pub fn measure(raster: &Raster, mesh: &Triangulation) -> Measured {
             return nothing;
         }
         let mut worst = nothing;
-        let plane = scan::Plane::new(raster.heights(), columns, corners);
+        let plane = Plane::new(raster.heights(), columns, corners);
         spans(corners, |row, first, last| {
             let start = row as usize * columns;
             mark(&covered, start + first as usize..start + last as usize + 1);

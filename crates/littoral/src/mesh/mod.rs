@@ -13,6 +13,7 @@ pub use model::{Form, Model, ModelError};
 
 pub mod measure;
 pub mod rtin;
+pub mod tin;
 
 /// Triangles over samples of a raster.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
