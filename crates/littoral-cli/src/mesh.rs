@@ -8,7 +8,7 @@ use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use glam::{DAffine2, DVec2, DVec4};
 use littoral::field::{Land, coast};
 use littoral::mesh::measure::measure;
-use littoral::mesh::{Form, Model, Triangulation, rtin};
+use littoral::mesh::{Form, Model, Triangulation, rtin, tin};
 use littoral_data::write::{self, MeshFormat};
 use littoral_data::{Crs, name_of_all};
 use serde::Serialize;
@@ -44,7 +44,7 @@ pub struct Mesh {
     #[arg(long, short, value_name = "FILE", default_value = "littoral.ply")]
     out: PathBuf,
     /// How triangles are chosen
-    #[arg(long, value_enum, value_name = "METHOD", default_value = "rtin")]
+    #[arg(long, value_enum, value_name = "METHOD", default_value = "tin")]
     method: Method,
     /// The mesh is nowhere farther above or below a sample than this (metres) [default: a two-hundredth of the relief]
     #[arg(long, value_name = "METRES", value_parser = max_error)]
@@ -268,7 +268,10 @@ impl Mesh {
                 let mut mesh = Triangulation::default();
                 rtin::Rtin::new(raster).extract(raster, single, &mut mesh).map(|()| mesh)
             }
-            Method::Tin => return Err(Failure::Usage("expected --method rtin, got tin, which is still to come".into())),
+            Method::Tin => tin::triangulate(raster, single, &|done| {
+                bar.set_position((done * 1000.0) as u64);
+                true
+            }),
         };
         bar.finish_and_clear();
         made.map_err(|error| Failure::Work(format!("{}: {error}", ground.name)))
