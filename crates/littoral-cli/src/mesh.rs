@@ -115,6 +115,8 @@ struct Ground {
     frame: Frame,
     /// What heights are counted from, in words.
     datum: String,
+    /// The distance between heights that the file can tell apart (m).
+    step: f64,
     built_in: bool,
 }
 
@@ -161,7 +163,8 @@ impl Mesh {
         let (land, raster) = (&ground.land, ground.land.raster());
         let failure = |problem: &str| Failure::Work(format!("{}: {problem}", ground.name));
         let range = land.height_range();
-        let asked = self.max_error.unwrap_or_else(|| suiting(f64::from(range.high) - f64::from(range.low)));
+        let asked =
+            self.max_error.unwrap_or_else(|| suiting(f64::from(range.high) - f64::from(range.low), ground.step));
         let base = base.map(|height| height.unwrap_or_else(|| self.below(land)));
         if let Some(base) = base.filter(|&base| base >= f64::from(range.low)) {
             let (low, base) = (range.low, tidy(base, 3));
@@ -231,6 +234,7 @@ impl Mesh {
                 land: coast::coast(),
                 frame: Frame::metres(),
                 datum: "heights above its sea level".into(),
+                step: 0.0,
                 built_in: true,
             });
         }
@@ -254,7 +258,7 @@ impl Mesh {
                 "{name}: the error is that to the coarser samples; --full takes all, --window X,Y,X,Y all of a part"
             ));
         }
-        Ok(Ground { name, land, frame, datum: opened.datum(), built_in: false })
+        Ok(Ground { name, land, frame, datum: opened.datum(), step: opened.info().step, built_in: false })
     }
 
     fn triangles(&self, ground: &Ground, asked: f64) -> Result<Triangulation, Failure> {
@@ -387,9 +391,9 @@ fn optional_height(
     }
 }
 
-/// A bound (m) that suits some relief: a two-hundredth, in round numbers.
-fn suiting(relief: f64) -> f64 {
-    let error = (relief / 200.0).max(1e-3);
+/// A bound (m) that suits some relief, known in steps: a two-hundredth, in round numbers, but no less than half a step.
+fn suiting(relief: f64, step: f64) -> f64 {
+    let error = (relief / 200.0).max(0.5 * step).max(1e-3);
     let power = 10f64.powf(error.log10().floor());
     let digit = [5.0, 2.0, 1.0].into_iter().find(|digit| digit * power <= error * 1.000_001).unwrap_or(1.0);
     // By way of text, which leaves no dust behind the digits.

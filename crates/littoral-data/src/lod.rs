@@ -147,12 +147,8 @@ mod tests {
     fn a_sphere_gets_coarser_and_stays_a_sphere() {
         let full = sphere(5);
         let reduction = |share, max_error| Reduction { share, max_error };
-        let asked = [
-            reduction(0.5, f64::INFINITY),
-            reduction(0.1, f64::INFINITY),
-            reduction(0.0, 0.5),
-            reduction(0.0, 2.0),
-        ];
+        let asked =
+            [reduction(0.5, f64::INFINITY), reduction(0.1, f64::INFINITY), reduction(0.0, 0.5), reduction(0.0, 2.0)];
         let chain = lod_chain(&full, &asked).expect("a chain");
         assert_eq!(chain.len(), 5);
         assert_eq!((&chain[0].model, chain[0].error), (&full, 0.0));

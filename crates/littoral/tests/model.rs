@@ -48,9 +48,8 @@ fn rasters() -> impl Strategy<Value = Raster> {
             4 => (-3i8..4).prop_map(f32::from),
             4 => -20f32..30.0,
         ];
-        proptest::collection::vec(height, columns * rows).prop_map(move |heights| {
-            Raster::new(columns, rows, DVec2::new(2.0, 3.0), heights).expect("a raster")
-        })
+        proptest::collection::vec(height, columns * rows)
+            .prop_map(move |heights| Raster::new(columns, rows, DVec2::new(2.0, 3.0), heights).expect("a raster"))
     })
 }
 
@@ -158,6 +157,11 @@ proptest! {
             matches!((owner(from, to), owner(to, from)), (Some(left), Some(right)) if high(left) && !high(right))
         }).map(|&(from, to)| [from, to]).collect();
         let mut line = cut.shoreline.clone();
+        // Along each line edges follow each other: no other could go on where a line breaks off.
+        for (place, pair) in line.windows(2).enumerate() {
+            let later = line[place + 1..].iter().any(|edge| edge[0] == pair[0][1]);
+            prop_assert!(pair[0][1] == pair[1][0] || !later, "{line:?}");
+        }
         expected.sort_unstable();
         line.sort_unstable();
         prop_assert!(line.as_flattened().iter().all(|&v| cut.positions[v as usize].z == level));
@@ -179,7 +183,8 @@ fn voids_that_touch_in_a_corner_leave_two_walls() {
     heights[3 * 6 + 3] = f32::NAN;
     let raster = Raster::new(6, 6, DVec2::ONE, heights).expect("a raster");
     let mesh = whole(&raster);
-    let model = Model::new(&mesh, &raster, &Form { base: Some(0.0), shoreline: Some(0.5), ..LATTICE }).expect("a model");
+    let model =
+        Model::new(&mesh, &raster, &Form { base: Some(0.0), shoreline: Some(0.5), ..LATTICE }).expect("a model");
     let parted: Vec<DVec3> =
         model.positions.iter().copied().filter(|at| at.z == 1.0 && at.truncate().fract() != DVec2::ZERO).collect();
     assert_eq!(parted.len(), 2, "{parted:?}");
@@ -196,8 +201,7 @@ fn normals_are_those_of_the_data_however_few_the_triangles() {
     let (columns, spacing) = (9, DVec2::new(2.0, 5.0));
     let heights: Vec<f32> = (0..9 * 2).map(|i| (2.0 * (i % 9) as f32).powi(2) / 10.0).collect();
     let raster = Raster::new(columns, 2, spacing, heights).expect("a raster");
-    let mesh =
-        Triangulation { vertices: vec![[0, 0], [4, 0], [8, 0], [4, 1]], triangles: vec![[0, 1, 3], [1, 2, 3]] };
+    let mesh = Triangulation { vertices: vec![[0, 0], [4, 0], [8, 0], [4, 1]], triangles: vec![[0, 1, 3], [1, 2, 3]] };
     let place = |at: DVec2| at * spacing;
     let form = Form { exaggeration: 3.0, place: &place, ..LATTICE };
     let model = Model::new(&mesh, &raster, &form).expect("a model");

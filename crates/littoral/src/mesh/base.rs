@@ -54,7 +54,8 @@ fn outlined(positions: &[DVec3], border: &[[u32; 2]]) -> Option<(Vec<u32>, Vec<[
     let places = vertices.iter().map(|&vertex| positions[vertex as usize]).map(|at| Point2::new(at.x, at.y));
     let edges = border.iter().map(|edge| edge.map(number)).collect();
     let mut crossed = false;
-    let net = ConstrainedDelaunayTriangulation::<Point2<f64>>::try_bulk_load_cdt(places.collect(), edges, |_| crossed = true);
+    let net =
+        ConstrainedDelaunayTriangulation::<Point2<f64>>::try_bulk_load_cdt(places.collect(), edges, |_| crossed = true);
     let net = net.ok().filter(|net| !crossed && net.num_vertices() == vertices.len())?;
     // From the border inward, never across it.
     let mut inside = vec![false; net.num_all_faces()];

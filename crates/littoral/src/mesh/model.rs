@@ -24,7 +24,7 @@ pub struct Model {
     pub triangles: Vec<[u32; 3]>,
     /// How many triangles are ground; the others are the walls and the bottom of a base.
     pub ground_triangles: usize,
-    /// The waterline: edges of triangles, with higher ground on their left.
+    /// The waterline: edges of triangles, with higher ground on their left, one after the other along each line.
     pub shoreline: Vec<[u32; 2]>,
 }
 

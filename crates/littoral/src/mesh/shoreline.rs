@@ -9,7 +9,7 @@ use std::cmp::Ordering;
 use std::collections::HashMap;
 
 /// Parts triangles where they cross `level`; positions are columns, rows and heights, `spacing` (m) apart. Answers with
-/// the edges of the line, higher ground on their left.
+/// the edges of the line, higher ground on their left, one after the other along it.
 pub(super) fn cut(
     positions: &mut Vec<DVec3>,
     triangles: &mut Vec<[u32; 3]>,
@@ -77,5 +77,28 @@ fn line(triangles: &[[u32; 3]], side: &[Ordering]) -> Vec<[u32; 2]> {
     }
     other.sort_unstable();
     above.retain(|edge| other.binary_search(edge).is_ok());
-    above
+    chained(above)
+}
+
+/// The same edges, each followed by one that goes on where it ends, as far as there is one.
+fn chained(mut edges: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
+    edges.sort_unstable();
+    let mut ends: Vec<u32> = edges.iter().map(|edge| edge[1]).collect();
+    ends.sort_unstable();
+    // Lines that begin somewhere first, then those that are closed.
+    let begins = |edge: &[u32; 2]| ends.binary_search(&edge[0]).is_err();
+    let starts: Vec<usize> = (0..edges.len()).filter(|&edge| begins(&edges[edge])).chain(0..edges.len()).collect();
+    let mut done = vec![false; edges.len()];
+    let mut chained = Vec::with_capacity(edges.len());
+    for start in starts {
+        let mut next = Some(start).filter(|&edge| !done[edge]);
+        while let Some(edge) = next {
+            done[edge] = true;
+            chained.push(edges[edge]);
+            let [_, end] = edges[edge];
+            let first = edges.partition_point(|other| other[0] < end);
+            next = (first..edges.len()).take_while(|&other| edges[other][0] == end).find(|&other| !done[other]);
+        }
+    }
+    chained
 }

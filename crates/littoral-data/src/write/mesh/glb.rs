@@ -48,13 +48,15 @@ pub(super) fn write(sink: &mut dyn Sink, model: &Model, origin: DVec3, notes: &[
         accessors.len() - 1
     };
     let bounds = [low.to_array(), high.to_array()];
-    let positions = json!({ "componentType": F32, "count": vertices, "type": "VEC3", "min": bounds[0], "max": bounds[1] });
+    let positions =
+        json!({ "componentType": F32, "count": vertices, "type": "VEC3", "min": bounds[0], "max": bounds[1] });
     let mut attributes = json!({ "POSITION": add(12 * vertices, VERTICES, positions) });
     if all_normals(model) {
         let normals = json!({ "componentType": F32, "count": vertices, "type": "VEC3" });
         attributes["NORMAL"] = json!(add(12 * vertices, VERTICES, normals));
     }
-    let mut index = |count: usize| add(4 * count, INDICES, json!({ "componentType": U32, "count": count, "type": "SCALAR" }));
+    let mut index =
+        |count: usize| add(4 * count, INDICES, json!({ "componentType": U32, "count": count, "type": "SCALAR" }));
     let mut primitives =
         vec![json!({ "attributes": attributes, "indices": index(corners), "mode": TRIANGLES, "material": 0 })];
     if ends > 0 {

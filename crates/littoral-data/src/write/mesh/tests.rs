@@ -111,7 +111,8 @@ fn obj_comes_back_in_full() {
         let (models, _) = tobj::load_obj_buf(&mut BufReader::new(&bytes[..]), &options, none).expect("an OBJ file");
         let of_group = |name: &str| models.iter().find(|model| model.name == name).map(|model| &model.mesh);
         let corners = |mesh: &tobj::Mesh| -> Vec<[f32; 3]> {
-            let at = |&i: &u32| <[f32; 3]>::try_from(&mesh.positions[3 * i as usize..3 * i as usize + 3]).expect("three");
+            let at =
+                |&i: &u32| <[f32; 3]>::try_from(&mesh.positions[3 * i as usize..3 * i as usize + 3]).expect("three");
             mesh.indices.iter().map(at).collect()
         };
         let expected = |triangles: &[[u32; 3]]| -> Vec<[f32; 3]> {
