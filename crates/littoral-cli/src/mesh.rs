@@ -21,11 +21,11 @@ use std::time::Instant;
 /// Normals are those of the full data, however few the triangles. Without FILE the built-in coast is taken.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  littoral mesh dem.tif                                    into littoral.ply, with an error that suits the relief
+  littoral mesh dem.tif                                    into littoral.ply
   littoral mesh dem.tif --max-error 2 --out dem.glb        nowhere farther than 2 m from the data
-  littoral mesh dem.tif --base --local --out print.stl     closed by walls and a bottom, ready to be printed
+  littoral mesh dem.tif --base --local --out print.stl     closed, ready to be printed
   littoral mesh dem.tif --base -50 --exaggeration 2 --out print.stl
-  littoral mesh coast.tif --shoreline --out coast.glb      with the line of height 0 as edges of the mesh
+  littoral mesh coast.tif --shoreline --out coast.glb      keeps the line of height 0 as edges
   littoral mesh N45W122.hgt N46W122.hgt --out both.ply     files that join, as one land
   littoral mesh dem.tif --window 560000,5110000,565000,5115000 --max-error 0.5
   littoral mesh dem.tif --lonlat --out degrees.obj
@@ -46,7 +46,8 @@ pub struct Mesh {
     /// How triangles are chosen
     #[arg(long, value_enum, value_name = "METHOD", default_value = "tin")]
     method: Method,
-    /// The mesh is nowhere farther above or below a sample than this (metres) [default: a two-hundredth of the relief]
+    /// The mesh is nowhere farther above or below a sample than this (metres) [default: a two-hundredth of the
+    /// relief, half a step of the file's heights at least]
     #[arg(long, value_name = "METRES", value_parser = max_error)]
     max_error: Option<f64>,
 

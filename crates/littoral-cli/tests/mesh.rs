@@ -290,6 +290,41 @@ fn wrong_orders_are_refused_before_any_work() {
     json(&["mesh", "--shoreline", &desk.land, "--out", &out]);
 }
 
+#[test]
+fn files_that_join_become_one_mesh() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let half = |name: &str, first: usize| {
+        let file = folder.path().join(name);
+        let georeference = Georeference {
+            geotransform: [CELL * first as f64, CELL, 0.0, 0.0, 0.0, -CELL],
+            registration: Registration::Area,
+            crs: Crs::from_epsg(32610).expect("a zone of UTM"),
+            size: [20, 20],
+            y_south: false,
+        };
+        let heights: Vec<f32> = (0..400).map(|i| ((first + i % 20) as f32 * 0.4).sin() * 9.0 + (i / 20) as f32).collect();
+        geotiff(&file, &georeference, None, GridSamples::F32(&heights), None, "").expect("written");
+        file.display().to_string()
+    };
+    let (west, east) = (half("west.tif", 0), half("east.tif", 20));
+    let out = folder.path().join("both.obj").display().to_string();
+    let mesh = json(&["mesh", &west, &east, "--max-error", "0.5", "--out", &out]);
+    assert_eq!(mesh["samples"], 40 * 20);
+    let (vertices, triangles) = obj(&out);
+    // One surface, without a gap where the files meet: edges with one side only run along the outline.
+    let mut edges = HashMap::new();
+    for [a, b, c] in &triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            edges.insert((*from, *to), ());
+        }
+    }
+    for (from, to) in edges.keys().filter(|(from, to)| !edges.contains_key(&(*to, *from))) {
+        let (p, q) = (vertices[*from], vertices[*to]);
+        let along = |i: usize, low: f64, high: f64| p[i] == q[i] && (p[i] == low || p[i] == high);
+        assert!(along(0, 5.0, 395.0) || along(1, -195.0, -5.0), "{p:?} {q:?}");
+    }
+}
+
 /// Every real file of every format, where the folder of real data is there.
 #[test]
 fn meshes_of_real_files_keep_their_bound() {
