@@ -20,7 +20,7 @@ use super::measure::lies_on_surface;
 use super::{MeshError, Triangulation, tolerance};
 use crate::field::Raster;
 use candidate::{Candidate, Ground};
-use net::{CHANGED, NONE, Net, OUTSIDE};
+use net::{CHANGED, Net, OUTSIDE};
 
 /// By how much the threshold falls from phase to phase: less makes fewer triangles, and more work.
 const FALL: f32 = 0.7;

@@ -78,13 +78,19 @@ impl Exactness {
     /// Of all heights of a raster.
     pub fn of(raster: &Raster) -> Exactness {
         let (mut lowest, mut highest) = (i32::MAX, i32::MIN);
-        for height in raster.heights() {
-            let (bits, exponent) = (height.to_bits() & 0x7f_ffff, (height.to_bits() >> 23 & 0xff) as i32);
-            let mantissa = if exponent > 0 { bits | 0x80_0000 } else { bits };
-            if mantissa != 0 {
-                let exponent = exponent.max(1);
-                lowest = lowest.min(exponent + mantissa.trailing_zeros() as i32);
-                highest = highest.max(exponent + 32 - mantissa.leading_zeros() as i32);
+        for heights in raster.heights().chunks(4096) {
+            for height in heights {
+                let (bits, exponent) = (height.to_bits() & 0x7f_ffff, (height.to_bits() >> 23 & 0xff) as i32);
+                let mantissa = if exponent > 0 { bits | 0x80_0000 } else { bits };
+                if mantissa != 0 {
+                    let exponent = exponent.max(1);
+                    lowest = lowest.min(exponent + mantissa.trailing_zeros() as i32);
+                    highest = highest.max(exponent + 32 - mantissa.leading_zeros() as i32);
+                }
+            }
+            // More than anybody counts on.
+            if highest > lowest.saturating_add(40) || highest > 268 {
+                return Exactness { bits: 1000 };
             }
         }
         Exactness { bits: highest.checked_sub(lowest).map_or(0, |bits| bits.max(0) as u32) }
