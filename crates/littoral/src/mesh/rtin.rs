@@ -16,11 +16,11 @@
 //! M. Duchaineau et al., "ROAMing terrain", 1997 (diamonds); P. Lindstrom and V. Pascucci, "Terrain simplification
 //! simplified", 2002 (nested bounds).
 
-mod bands;
 mod blocks;
 mod cut;
 mod grow;
 mod prepare;
+mod search;
 
 use super::{MeshError, Triangulation, tolerance};
 use crate::field::Raster;

@@ -2,6 +2,7 @@
 
 use crate::field::Raster;
 use multiversion::multiversion;
+use rayon::prelude::*;
 
 /// Rounds a quotient of two integers up to 2²⁴ down exactly, from its product in `f64`: that errs by less than 2⁻²⁸, and what
 /// is no whole number is at least 2⁻²⁴ away from one.
@@ -72,29 +73,42 @@ pub(crate) fn spans(mut corners: [[u32; 2]; 3], mut visit: impl FnMut(u32, u32, 
 pub(crate) struct Exactness {
     /// How many bits a height takes when counted in steps, without its sign.
     pub bits: u32,
+    /// The greatest height above or below 0 (m).
+    pub highest: f64,
 }
 
 impl Exactness {
     /// Of all heights of a raster.
     pub fn of(raster: &Raster) -> Exactness {
-        let (mut lowest, mut highest) = (i32::MAX, i32::MIN);
-        for heights in raster.heights().chunks(4096) {
-            for height in heights {
-                let (bits, exponent) = (height.to_bits() & 0x7f_ffff, (height.to_bits() >> 23 & 0xff) as i32);
-                let mantissa = if exponent > 0 { bits | 0x80_0000 } else { bits };
-                if mantissa != 0 {
-                    let exponent = exponent.max(1);
-                    lowest = lowest.min(exponent + mantissa.trailing_zeros() as i32);
-                    highest = highest.max(exponent + 32 - mantissa.leading_zeros() as i32);
-                }
-            }
-            // More than anybody counts on.
-            if highest > lowest.saturating_add(40) || highest > 268 {
-                return Exactness { bits: 1000 };
-            }
+        let pieces = raster.heights().par_chunks(1 << 16).map(digits);
+        let (last, first) = pieces.reduce(|| (i32::MAX, 0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let highest = f64::from(f32::from_bits(first));
+        if highest > 1e36 {
+            // So large that single precision could overflow.
+            return Exactness { bits: 1000, highest };
         }
-        Exactness { bits: highest.checked_sub(lowest).map_or(0, |bits| bits.max(0) as u32) }
+        // The exponent of the first digit, in the same count as that of the last.
+        let first = (first >> 23).max(1) as i32 + 24;
+        Exactness { bits: if last == i32::MAX { 0 } else { (first - last) as u32 }, highest }
     }
+}
+
+/// The lowest place of a digit that is not 0 in any number, and the greatest of them without its sign, as bits.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn digits(heights: &[f32]) -> (i32, u32) {
+    let (mut lowest, mut highest) = (i32::MAX, 0);
+    for height in heights {
+        let bits = height.to_bits() & 0x7fff_ffff;
+        let exponent = (bits >> 23) as i32;
+        let mantissa = (bits & 0x7f_ffff) | if exponent > 0 { 0x80_0000 } else { 0 };
+        // The last digit by itself, made a number whose exponent tells its place.
+        let last = (mantissa & mantissa.wrapping_neg()) as i32 as f32;
+        let place = exponent.max(1) + (last.to_bits() >> 23) as i32 - 127;
+        let place = if mantissa == 0 { i32::MAX } else { place };
+        lowest = lowest.min(place);
+        highest = highest.max(bits);
+    }
+    (lowest, highest)
 }
 
 /// The plane through the corners of a triangle, all numbers multiplied by twice its area so that no division rounds them.

@@ -1,14 +1,14 @@
-//! Deviations of small squares: sixteen blocks of 32 × 32 patches side by side, one in each lane.
+//! Deviations of small squares: sixteen blocks of 64 × 64 patches side by side, one in each lane.
 //!
 //! The samples of the blocks are laid out anew so that sixteen at the same place in their blocks lie together; from then on
-//! each lane does what a program for one block would do, without a shuffle, for squares of 2, 4, 8, 16 and 32 patches.
+//! each lane does what a program for one block would do, without a shuffle, for squares of 2, 4, 8, 16, 32 and 64 patches.
 
 use multiversion::multiversion;
 
 /// Patches along the side of a block.
-pub(super) const SIDE: usize = 32;
+pub(super) const SIDE: usize = 64;
 /// Sizes of squares in it.
-pub(super) const SIZES: usize = 5;
+pub(super) const SIZES: usize = 6;
 /// Blocks side by side.
 pub(super) const LANES: usize = 16;
 
@@ -19,8 +19,8 @@ type Lanes = [f32; LANES];
 /// What rounding may add to an error computed in single precision, as a share of the greatest height that it is computed
 /// from, and of itself: six roundings of numbers not above twice that height, and one of the difference, each of half a last
 /// digit.
-pub(super) const OF_HEIGHT: f32 = 4.0 * f32::EPSILON;
-pub(super) const OF_ERROR: f32 = 2.0 * f32::EPSILON;
+const OF_HEIGHT: f32 = 4.0 * f32::EPSILON;
+const OF_ERROR: f32 = 2.0 * f32::EPSILON;
 
 /// Samples of sixteen blocks, and the deviations of their squares.
 pub(super) struct Blocks {
@@ -68,10 +68,10 @@ impl Blocks {
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn lay_out(heights: &[f32], columns: usize, corners: &[usize; LANES], samples: &mut [Lanes]) {
     for (y, line) in samples.chunks_exact_mut(LINE).enumerate() {
-        let rows: [&[f32]; LANES] = std::array::from_fn(|lane| &heights[corners[lane] + y * columns..][..LINE]);
-        for x in 0..LINE {
-            for lane in 0..LANES {
-                line[x][lane] = rows[lane][x];
+        for lane in 0..LANES {
+            let row = &heights[corners[lane] + y * columns..][..LINE];
+            for x in 0..LINE {
+                line[x][lane] = row[x];
             }
         }
     }
@@ -91,9 +91,34 @@ fn farthest(greatest: &mut Lanes, base: &Lanes, slope: &Lanes, first: i32, line:
     *greatest = most;
 }
 
+/// a · x + b in each lane.
 #[inline(always)]
-fn of(f: impl Fn(usize) -> f32) -> Lanes {
-    std::array::from_fn(f)
+fn linear(a: &Lanes, x: f32, b: &Lanes) -> Lanes {
+    let mut sum = [0.0; LANES];
+    for lane in 0..LANES {
+        sum[lane] = a[lane].mul_add(x, b[lane]);
+    }
+    sum
+}
+
+/// (b − a) · share in each lane.
+#[inline(always)]
+fn slope(a: &Lanes, b: &Lanes, share: f32) -> Lanes {
+    let mut slope = [0.0; LANES];
+    for lane in 0..LANES {
+        slope[lane] = (b[lane] - a[lane]) * share;
+    }
+    slope
+}
+
+/// The slope from the middle of a side to the centre.
+#[inline(always)]
+fn rise(a: &Lanes, b: &Lanes, centre: &Lanes, share: f32) -> Lanes {
+    let mut slope = [0.0; LANES];
+    for lane in 0..LANES {
+        slope[lane] = (centre[lane] - (0.5 * a[lane] + 0.5 * b[lane])) * share;
+    }
+    slope
 }
 
 #[inline(always)]
@@ -103,63 +128,76 @@ fn raise(kept: &mut Lanes, found: &Lanes) {
     }
 }
 
+/// Adds what may have been lost by rounding.
+#[inline(always)]
+fn widen(errors: &mut Lanes, doubt: &Lanes) {
+    for lane in 0..LANES {
+        errors[lane] = errors[lane].mul_add(1.0 + OF_ERROR, doubt[lane]);
+    }
+}
+
 /// The greatest errors of one square of S patches a side: of its halves, and of its southern, eastern, northern and western
 /// quarter.
 #[inline(always)]
 fn square<const S: usize>(samples: &[Lanes], at: usize, rises: bool, exact: bool) -> (Lanes, [Lanes; 4]) {
     let (half, share) = (S / 2, 1.0 / S as f32);
-    let line = |y: usize| &samples[at + y * LINE..][..S + 1];
-    let (a, b, c, d, m) = (&line(0)[0], &line(0)[S], &line(S)[0], &line(S)[S], &line(half)[half]);
-    let slope = |p: &Lanes, q: &Lanes| of(|l| (q[l] - p[l]) * share);
-    let (south, north, west, east) = (slope(a, b), slope(c, d), slope(a, c), slope(b, d));
+    let (a, b) = (&samples[at], &samples[at + S]);
+    let (c, d) = (&samples[at + S * LINE], &samples[at + S * LINE + S]);
+    let m = &samples[at + half * LINE + half];
+    let (south, north) = (slope(a, b, share), slope(c, d, share));
+    let (west, east) = (slope(a, c, share), slope(b, d, share));
     let mut halves = [0.0; LANES];
     for y in 1..S {
         let (up, down) = (y as f32, y as f32 - S as f32);
-        let line = line(y);
+        let line = &samples[at + y * LINE..][..S + 1];
         if rises {
             // North-west of the diagonal the northern side's slope, from the western side; else the southern one's, and
             // from there as the eastern side.
-            farthest(&mut halves, &of(|l| west[l].mul_add(up, a[l])), &north, 1, &line[1..y]);
-            farthest(&mut halves, &of(|l| east[l].mul_add(up, a[l])), &south, y as i32, &line[y..S]);
+            farthest(&mut halves, &linear(&west, up, a), &north, 1, &line[1..y]);
+            farthest(&mut halves, &linear(&east, up, a), &south, y as i32, &line[y..S]);
         } else {
-            farthest(&mut halves, &of(|l| west[l].mul_add(up, a[l])), &south, 1, &line[1..S + 1 - y]);
-            farthest(&mut halves, &of(|l| east[l].mul_add(down, c[l])), &north, (S + 1 - y) as i32, &line[S + 1 - y..S]);
+            farthest(&mut halves, &linear(&west, up, a), &south, 1, &line[1..S + 1 - y]);
+            farthest(&mut halves, &linear(&east, down, c), &north, (S + 1 - y) as i32, &line[S + 1 - y..S]);
         }
     }
     let toward = 1.0 / half as f32;
-    let rise = |p: &Lanes, q: &Lanes| of(|l| (m[l] - (0.5 * p[l] + 0.5 * q[l])) * toward);
-    let (from_south, from_north, from_west, from_east) = (rise(a, b), rise(c, d), rise(a, c), rise(b, d));
+    let (from_south, from_north) = (rise(a, b, m, toward), rise(c, d, m, toward));
+    // Eastward from both sides.
+    let (from_west, from_east) = (rise(a, c, m, toward), rise(b, d, m, -toward));
     let mut quarters = [[0.0; LANES]; 4];
     for y in 0..=S {
-        let (up, down, line) = (y as f32, (S - y) as f32, line(y));
+        let (up, down) = (y as f32, (S - y) as f32);
+        let line = &samples[at + y * LINE..][..S + 1];
         let depth = y.min(S - y);
         if y < half {
-            let base = of(|l| from_south[l].mul_add(up, a[l]));
+            let base = linear(&from_south, up, a);
             farthest(&mut quarters[0], &base, &south, depth as i32 + 1, &line[depth + 1..S - depth]);
         }
         if y > half {
-            let base = of(|l| from_north[l].mul_add(down, c[l]));
+            let base = linear(&from_north, down, c);
             farthest(&mut quarters[2], &base, &north, depth as i32 + 1, &line[depth + 1..S - depth]);
         }
         if depth > 0 {
-            let base = of(|l| west[l].mul_add(up, a[l]));
+            let base = linear(&west, up, a);
             farthest(&mut quarters[3], &base, &from_west, 0, &line[..depth]);
             // Counted from the eastern side.
-            let (base, falls) = (of(|l| east[l].mul_add(up, b[l])), of(|l| -from_east[l]));
-            farthest(&mut quarters[1], &base, &falls, 1 - depth as i32, &line[S + 1 - depth..]);
+            let base = linear(&east, up, b);
+            farthest(&mut quarters[1], &base, &from_east, 1 - depth as i32, &line[S + 1 - depth..]);
         }
     }
     if !exact {
-        // Nothing is rounded where all corners are equally high.
-        let doubt = of(|l| {
+        let mut doubt = [0.0; LANES];
+        for l in 0..LANES {
             let highest = a[l].abs().max(b[l].abs()).max(c[l].abs()).max(d[l].abs()).max(m[l].abs());
-            let flat = a[l] == b[l] && a[l] == c[l] && a[l] == d[l] && a[l] == m[l];
+            // Nothing is rounded where all corners are equally high.
+            let flat = (a[l] == b[l]) & (a[l] == c[l]) & (a[l] == d[l]) & (a[l] == m[l]);
             // Too large where differences could overflow: then nothing is known.
-            if flat { 0.0 } else { highest.max(1e-30) * 34.0 * (OF_HEIGHT / 34.0) }
-        });
-        let widen = |error: &mut Lanes| *error = of(|l| error[l].mul_add(1.0 + OF_ERROR, doubt[l]));
-        widen(&mut halves);
-        quarters.iter_mut().for_each(widen);
+            doubt[l] = if flat { 0.0 } else { highest.max(1e-30) * 34.0 * (OF_HEIGHT / 34.0) };
+        }
+        widen(&mut halves, &doubt);
+        for quarter in &mut quarters {
+            widen(quarter, &doubt);
+        }
     }
     (halves, quarters)
 }
@@ -200,4 +238,5 @@ fn measure(samples: &[Lanes], rises: bool, exact: [bool; SIZES], found: &mut [La
     squares::<8>(samples, rises, exact[2], &mut found[offsets(2)[0]..offsets(3)[0]]);
     squares::<16>(samples, rises, exact[3], &mut found[offsets(3)[0]..offsets(4)[0]]);
     squares::<32>(samples, rises, exact[4], &mut found[offsets(4)[0]..offsets(5)[0]]);
+    squares::<64>(samples, rises, exact[5], &mut found[offsets(5)[0]..offsets(6)[0]]);
 }

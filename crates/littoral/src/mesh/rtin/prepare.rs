@@ -1,13 +1,13 @@
 //! Measuring all deviations.
 //!
-//! The raster is worked on in strips of 32 rows of patches, each by itself: small squares in blocks ([`super::blocks`]), large
-//! ones by rows of samples ([`super::bands`]), and what is cut by the raster's border or partly void one triangle after the
-//! other. A side between two strips has a triangle in each, so that what depends on it is raised once more in the end.
+//! The raster is worked on in strips of 64 rows of patches, each by itself, with small squares in blocks ([`super::blocks`]);
+//! large ones follow from small ones ([`super::search`]); what is cut by the raster's border or partly void is measured one
+//! triangle after the other. A side between two strips has a triangle in each, so that what depends on it is raised once more in the end.
 //! Greatest numbers do not depend on the order they are compared in: any number of threads finds the same bits.
 
-use super::bands::{self, Errors, Piece};
 use super::blocks::{self, Blocks, LANES, SIDE, SIZES};
 use super::cut::Cut;
+use super::search::{self, Stack};
 use super::{Corners, Level, Part, Rtin, halves, quarter, rises};
 use crate::field::Raster;
 use crate::mesh::measure::{Exactness, deviation, patch_exists};
@@ -38,6 +38,9 @@ fn half_states(states: States, rises: bool) -> [u8; 2] {
         [of(Part::South) | of(Part::West), of(Part::North) | of(Part::East)]
     }
 }
+
+/// The greatest errors of a square: of its halves, and of its southern, eastern, northern and western quarter (m).
+type Errors = [f32; 5];
 
 /// The deviations of a strip's squares of one size.
 struct Rows<'a> {
@@ -133,6 +136,8 @@ struct Ground<'a> {
     /// States of all squares of each size; empty where nothing is void.
     states: Vec<Vec<States>>,
     last: [u32; 2],
+    /// The greatest height above or below 0 (m).
+    highest: f64,
 }
 
 impl Ground<'_> {
@@ -153,9 +158,19 @@ impl Ground<'_> {
     }
 
     /// The greatest errors of any square, triangle by triangle.
-    fn square(&self, k: usize, x: usize, y: usize) -> Errors {
+    fn square(&self, k: usize, x: usize, y: usize, one: &mut dyn FnMut(Corners, u8) -> f32) -> Errors {
         let (side, states) = (2u32 << k, self.states(k, x, y));
-        let one = |corners: Corners, state: u8| match state {
+        let (west, south) = (x as u32 * side, y as u32 * side);
+        let [state_a, state_b] = half_states(states, rises(x, y));
+        let [a, b] = halves(west, south, side, rises(x, y));
+        let centre = one(a, state_a).max(one(b, state_b));
+        let mut part = |part| one(quarter(west, south, side, part), state(states, part));
+        [centre, part(Part::South), part(Part::East), part(Part::North), part(Part::West)]
+    }
+
+    /// The greatest error of a triangle that may be cut or partly void, from all of its samples.
+    fn any(&self, corners: Corners, state: u8) -> f32 {
+        match state {
             _ if state == SOLID | VOID => f32::INFINITY,
             SOLID => {
                 let measure =
@@ -163,17 +178,34 @@ impl Ground<'_> {
                 up(Cut::new(corners, self.last).triangles().map(measure).fold(0.0, f64::max))
             }
             _ => 0.0,
-        };
-        let (west, south) = (x as u32 * side, y as u32 * side);
-        let [state_a, state_b] = half_states(states, rises(x, y));
-        let [a, b] = halves(west, south, side, rises(x, y));
-        let part = |part| one(quarter(west, south, side, part), state(states, part));
-        let centre = one(a, state_a).max(one(b, state_b));
-        [centre, part(Part::South), part(Part::East), part(Part::North), part(Part::West)]
+        }
     }
 
-    /// Measures all small squares of a strip, and the large ones as far as they lie in it.
-    fn strip(&self, strip: usize, sizes: &mut [Rows]) -> Vec<Errors> {
+    /// The greatest error of a large triangle, from smaller ones where it is whole.
+    fn large(&self, rtin: &Rtin, stack: &mut Stack, corners: Corners, state: u8) -> f32 {
+        if state != SOLID || corners.iter().any(|at| at[0] > self.last[0] || at[1] > self.last[1]) {
+            return self.any(corners, state);
+        }
+        // The right angle is at the corner that the others are equally far from.
+        let [a, b, c] = corners;
+        let squared = |p: [u32; 2], q: [u32; 2]| {
+            [0, 1].map(|i| (i64::from(p[i]) - i64::from(q[i])).pow(2)).into_iter().sum::<i64>()
+        };
+        let longest = squared(a, b).max(squared(b, c)).max(squared(c, a));
+        let turned = match longest {
+            _ if longest == squared(a, b) => [a, b, c],
+            _ if longest == squared(b, c) => [b, c, a],
+            _ => [c, a, b],
+        };
+        let heights = self.raster.heights();
+        let error = search::deviation(rtin, heights, turned, stack);
+        // Halving heights time and again may round them, unless they have few digits.
+        let rounding = if self.exactness.bits <= 24 { 0.0 } else { 64.0 * f64::EPSILON * self.highest };
+        up(if error > 0.0 { error + rounding } else { error })
+    }
+
+    /// Measures all small squares of a strip.
+    fn strip(&self, strip: usize, sizes: &mut [Rows], blocks: &mut Blocks) {
         let columns = self.raster.columns();
         let mut lists = [Vec::new(), Vec::new()];
         for x in 0..(columns - 1).div_ceil(SIDE) {
@@ -183,7 +215,6 @@ impl Ground<'_> {
                 self.block(strip, x, sizes);
             }
         }
-        let mut blocks = Blocks::new();
         for (rises, list) in [false, true].into_iter().zip(lists) {
             for group in list.chunks(LANES) {
                 // Fewer blocks than lanes: the last one several times.
@@ -192,7 +223,7 @@ impl Ground<'_> {
                 let exact = std::array::from_fn(|k| self.exact(k));
                 blocks.measure(self.raster.heights(), columns, &corners, rises, exact);
                 for (k, rows) in sizes.iter_mut().enumerate() {
-                    collect(&blocks, k, &block[..group.len()], rows);
+                    collect(blocks, k, &block[..group.len()], rows);
                 }
             }
         }
@@ -200,7 +231,6 @@ impl Ground<'_> {
             let (finer, rest) = sizes.split_at_mut(k);
             rest[0].nest(finer.last().map(|finer| (&*finer.centres, finer.columns)));
         }
-        self.pieces(strip)
     }
 
     /// All small squares of a block, one by one.
@@ -209,35 +239,11 @@ impl Ground<'_> {
             let across = blocks::across(k);
             for y in 0..rows.rows {
                 for x in block * across..((block + 1) * across).min(rows.columns) {
-                    let errors = self.square(k, x, strip * across + y);
+                    let errors = self.square(k, x, strip * across + y, &mut |corners, state| self.any(corners, state));
                     rows.raise(x, y, errors);
                 }
             }
         }
-    }
-
-    /// The parts of large squares that lie in a strip, size by size.
-    fn pieces(&self, strip: usize) -> Vec<Errors> {
-        let columns = self.raster.columns();
-        let mut found = Vec::new();
-        for (k, level) in self.levels.iter().enumerate().skip(SIZES) {
-            let side = 2usize << k;
-            let y = strip * SIDE / side;
-            let first = strip * SIDE - y * side;
-            let last = if first + SIDE == side { side } else { first + SIDE - 1 };
-            for x in 0..level.columns {
-                found.push(match self.whole(k, x, y) {
-                    false => [0.0; 5],
-                    true => {
-                        let corner = y * side * columns + x * side;
-                        let (rises, exact) = (rises(x, y), self.exact(k));
-                        let piece = Piece { corner, side, rises, rows: [first, last], exact };
-                        bands::measure(self.raster.heights(), columns, &piece)
-                    }
-                });
-            }
-        }
-        found
     }
 }
 
@@ -270,15 +276,15 @@ pub(super) fn measure(rtin: &mut Rtin, raster: &Raster) {
     let levels = rtin.levels.clone();
     let states = if raster.voids().any() { all_states(raster, &levels) } else { Vec::new() };
     let last = [raster.columns() as u32 - 1, raster.rows() as u32 - 1];
-    let ground = Ground { raster, exactness: Exactness::of(raster), levels: &levels, states, last };
+    let exactness = Exactness::of(raster);
+    let ground = Ground { raster, exactness, levels: &levels, states, last, highest: exactness.highest };
     let strips = (raster.rows() - 1).div_ceil(SIDE);
     let small = levels.len().min(SIZES);
-    let (seams, parts): (Vec<Vec<Vec<f32>>>, Vec<Vec<Errors>>) = {
+    let seams: Vec<Vec<Vec<f32>>> = {
         let mut sizes = split(&mut rtin.deviations, &levels[..small], strips);
-        let work = |(strip, sizes): (usize, &mut Vec<Rows>)| ground.strip(strip, sizes);
-        let parts = sizes.par_iter_mut().enumerate().map(work).collect();
-        let seams = sizes.into_iter().map(|sizes| sizes.into_iter().map(|rows| rows.seam).collect());
-        (seams.collect(), parts)
+        let work = |blocks: &mut Blocks, (strip, sizes): (usize, &mut Vec<Rows>)| ground.strip(strip, sizes, blocks);
+        sizes.par_iter_mut().enumerate().for_each_init(Blocks::new, work);
+        sizes.into_iter().map(|sizes| sizes.into_iter().map(|rows| rows.seam).collect()).collect()
     };
     // What lies at the seams between strips, once more.
     for (strip, seams) in seams.into_iter().enumerate() {
@@ -291,23 +297,15 @@ pub(super) fn measure(rtin: &mut Rtin, raster: &Raster) {
             }
         }
     }
-    // Large squares: the parts found of each, or those that could not be found in parts.
-    let mut offset = 0;
     for k in small..levels.len() {
         let level = levels[k];
-        let across = (2usize << k) / SIDE;
-        let squares: Vec<Errors> = (0..level.columns * level.rows)
-            .into_par_iter()
-            .map(|index| {
-                let (x, y) = (index % level.columns, index / level.columns);
-                if !ground.whole(k, x, y) {
-                    return ground.square(k, x, y);
-                }
-                let parts = parts[y * across..((y + 1) * across).min(strips)].iter().map(|part| &part[offset + x]);
-                parts.fold([0.0; 5], |most, part| std::array::from_fn(|i| if part[i] > most[i] { part[i] } else { most[i] }))
-            })
-            .collect();
-        offset += level.columns;
+        let known = &*rtin;
+        let work = |stack: &mut Stack, index: usize| {
+            let (x, y) = (index % level.columns, index / level.columns);
+            ground.square(k, x, y, &mut |corners, state| ground.large(known, stack, corners, state))
+        };
+        let squares: Vec<Errors> =
+            (0..level.columns * level.rows).into_par_iter().map_init(Stack::default, work).collect();
         for (index, [centre, south, east, north, west]) in squares.into_iter().enumerate() {
             let (x, y) = (index % level.columns, index / level.columns);
             let deviations = &mut rtin.deviations;
