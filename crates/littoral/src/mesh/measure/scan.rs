@@ -2,7 +2,6 @@
 
 use crate::field::Raster;
 use multiversion::multiversion;
-use rayon::prelude::*;
 
 /// Rounds a quotient of two integers up to 2²⁴ down exactly, from its product in `f64`: that errs by less than 2⁻²⁸, and what
 /// is no whole number is at least 2⁻²⁴ away from one.
@@ -73,23 +72,26 @@ pub(crate) fn spans(mut corners: [[u32; 2]; 3], mut visit: impl FnMut(u32, u32, 
 pub(crate) struct Exactness {
     /// How many bits a height takes when counted in steps, without its sign.
     pub bits: u32,
-    /// The greatest height above or below 0 (m).
-    pub highest: f64,
 }
 
 impl Exactness {
+    /// More bits than can be counted on.
+    const NONE: Exactness = Exactness { bits: 1000 };
+
     /// Of all heights of a raster.
     pub fn of(raster: &Raster) -> Exactness {
-        let pieces = raster.heights().par_chunks(1 << 16).map(digits);
-        let (last, first) = pieces.reduce(|| (i32::MAX, 0), |a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let highest = f64::from(f32::from_bits(first));
-        if highest > 1e36 {
-            // So large that single precision could overflow.
-            return Exactness { bits: 1000, highest };
+        let (mut last, mut first) = (i32::MAX, 0);
+        for heights in raster.heights().chunks(1 << 14) {
+            let (lowest, highest) = digits(heights);
+            (last, first) = (last.min(lowest), first.max(highest));
+            // The exponent of the first digit, in the same count as that of the last; and what single precision can square.
+            let top = (first >> 23).max(1) as i32 + 24;
+            if last != i32::MAX && (top - last > 24 || f32::from_bits(first) > 1e18) {
+                return Exactness::NONE;
+            }
         }
-        // The exponent of the first digit, in the same count as that of the last.
-        let first = (first >> 23).max(1) as i32 + 24;
-        Exactness { bits: if last == i32::MAX { 0 } else { (first - last) as u32 }, highest }
+        let top = (first >> 23).max(1) as i32 + 24;
+        Exactness { bits: if last == i32::MAX { 0 } else { (top - last) as u32 } }
     }
 }
 

@@ -111,17 +111,110 @@ impl Growth<'_> {
         }
         let mut squares = vec![Square { x: 0, y: 0, corners }];
         let (mut finer, mut upper) = (Vec::new(), Vec::new());
+        let solid = !self.raster.voids().any();
         for k in (0..=top).rev() {
             finer.clear();
             let mut line = vec![NONE; self.rtin.levels[k].columns];
             for row in squares.chunk_by(|a, b| a.y == b.y) {
                 let mut east = NONE;
                 for square in row {
-                    self.split(k, square, &mut line, &mut east, &mut finer, &mut upper);
+                    if solid && (square.x + 1) << (k + 1) < self.last[0] && (square.y + 1) << (k + 1) < self.last[1] {
+                        self.split_inner(k, square, &mut line, &mut east, &mut finer, &mut upper);
+                    } else {
+                        self.split(k, square, &mut line, &mut east, &mut finer, &mut upper);
+                    }
                 }
                 finer.append(&mut upper);
             }
             std::mem::swap(&mut squares, &mut finer);
+        }
+    }
+
+    /// The same as [`Growth::split`] for most squares: those that nothing is cut from and that touch no border where triangles
+    /// are cut.
+    #[inline(always)]
+    fn split_inner(
+        &mut self,
+        k: usize,
+        square: &Square,
+        line: &mut [u32],
+        middle_east: &mut u32,
+        finer: &mut Vec<Square>,
+        upper: &mut Vec<Square>,
+    ) {
+        let (level, side) = (&self.rtin.levels[k], 2u32 << k);
+        let (x, y) = (square.x as usize, square.y as usize);
+        let (west, south, half) = (square.x * side, square.y * side, side / 2);
+        let [sw, se, nw, ne] = square.corners;
+        let deviations = &*self.rtin.deviations;
+        let [flat, upright] = [level.flat(x, y), level.upright(x, y)];
+        let split_south = deviations[flat] > self.max_error;
+        let split_north = deviations[flat + level.columns] > self.max_error;
+        let split_west = deviations[upright] > self.max_error;
+        let split_east = deviations[upright + 1] > self.max_error;
+        let vertices = &mut self.mesh.vertices;
+        vertices.reserve(5);
+        let mut vertex = |x: u32, y: u32| {
+            vertices.push([west + x, south + y]);
+            vertices.len() as u32 - 1
+        };
+        let centre = vertex(half, half);
+        let (mut s, mut w, mut e, mut n) = (NONE, NONE, NONE, NONE);
+        if split_south {
+            s = if y > 0 { line[x] } else { vertex(half, 0) };
+        }
+        if split_west {
+            w = if x > 0 { *middle_east } else { vertex(0, half) };
+        }
+        if split_east {
+            e = vertex(side, half);
+            *middle_east = e;
+        }
+        if split_north {
+            n = vertex(half, side);
+            line[x] = n;
+        }
+        let (mut child_sw, mut child_se, mut child_nw, mut child_ne) = (false, false, false, false);
+        if k > 0 {
+            // What is split has both of its sides split.
+            let finer = &self.rtin.levels[k - 1];
+            let first = finer.centre(2 * x, 2 * y);
+            let second = first + finer.columns;
+            child_sw = split_south && split_west && deviations[first] > self.max_error;
+            child_se = split_south && split_east && deviations[first + 1] > self.max_error;
+            child_nw = split_north && split_west && deviations[second] > self.max_error;
+            child_ne = split_north && split_east && deviations[second + 1] > self.max_error;
+        }
+        let triangles = &mut self.mesh.triangles;
+        triangles.reserve(8);
+        let mut quarter = |split: bool, from: u32, middle: u32, to: u32, first: bool, second: bool| {
+            if !split {
+                triangles.push([from, to, centre]);
+                return;
+            }
+            if !first {
+                triangles.push([from, middle, centre]);
+            }
+            if !second {
+                triangles.push([middle, to, centre]);
+            }
+        };
+        quarter(split_south, sw, s, se, child_sw, child_se);
+        quarter(split_east, se, e, ne, child_se, child_ne);
+        quarter(split_north, ne, n, nw, child_ne, child_nw);
+        quarter(split_west, nw, w, sw, child_nw, child_sw);
+        let (x, y) = (2 * square.x, 2 * square.y);
+        if child_sw {
+            finer.push(Square { x, y, corners: [sw, s, w, centre] });
+        }
+        if child_se {
+            finer.push(Square { x: x + 1, y, corners: [s, se, centre, e] });
+        }
+        if child_nw {
+            upper.push(Square { x, y: y + 1, corners: [w, centre, nw, n] });
+        }
+        if child_ne {
+            upper.push(Square { x: x + 1, y: y + 1, corners: [centre, e, n, ne] });
         }
     }
 

@@ -11,6 +11,7 @@ use super::search::{self, Stack};
 use super::{Corners, Level, Part, Rtin, halves, quarter, rises};
 use crate::field::Raster;
 use crate::mesh::measure::{Exactness, deviation, patch_exists};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Rounded up.
@@ -100,31 +101,42 @@ fn raise(kept: &mut f32, found: f32) {
     }
 }
 
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn raise_flat(sides: &mut [f32], centres: &[f32]) {
     let (pairs, last) = centres.as_chunks::<2>();
     for (side, [a, b]) in sides.iter_mut().zip(pairs) {
-        *side = side.max(a.max(*b));
+        *side = greater(*side, greater(*a, *b));
     }
     if let [last] = last {
-        raise(&mut sides[pairs.len()], *last);
+        sides[pairs.len()] = greater(sides[pairs.len()], *last);
     }
 }
 
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn raise_upright(sides: &mut [f32], centres: &[f32]) {
-    raise(&mut sides[0], centres[0]);
+    sides[0] = greater(sides[0], centres[0]);
     let (pairs, last) = centres[1..].as_chunks::<2>();
     for (side, [a, b]) in sides[1..].iter_mut().zip(pairs) {
-        *side = side.max(a.max(*b));
+        *side = greater(*side, greater(*a, *b));
     }
     if let [last] = last {
-        raise(&mut sides[1 + pairs.len()], *last);
+        sides[1 + pairs.len()] = greater(sides[1 + pairs.len()], *last);
     }
 }
 
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn raise_centres(centres: &mut [f32], south: &[f32], north: &[f32], upright: &[f32]) {
-    let sides = south.iter().zip(north).zip(upright.iter().zip(&upright[1..]));
-    for (centre, ((south, north), (west, east))) in centres.iter_mut().zip(sides) {
-        *centre = centre.max(south.max(*north)).max(west.max(*east));
+    let n = centres.len();
+    let (centres, south, north) = (&mut centres[..n], &south[..n], &north[..n]);
+    let (west, east) = (&upright[..n], &upright[1..][..n]);
+    for x in 0..n {
+        let sides = greater(greater(south[x], north[x]), greater(west[x], east[x]));
+        centres[x] = greater(centres[x], sides);
     }
 }
 
@@ -136,8 +148,6 @@ struct Ground<'a> {
     /// States of all squares of each size; empty where nothing is void.
     states: Vec<Vec<States>>,
     last: [u32; 2],
-    /// The greatest height above or below 0 (m).
-    highest: f64,
 }
 
 impl Ground<'_> {
@@ -200,7 +210,11 @@ impl Ground<'_> {
         let heights = self.raster.heights();
         let error = search::deviation(rtin, heights, turned, stack);
         // Halving heights time and again may round them, unless they have few digits.
-        let rounding = if self.exactness.bits <= 24 { 0.0 } else { 64.0 * f64::EPSILON * self.highest };
+        let highest = corners
+            .map(|at| f64::from(heights[at[1] as usize * self.raster.columns() + at[0] as usize]).abs())
+            .into_iter()
+            .fold(0.0, f64::max);
+        let rounding = if self.exactness.bits <= 24 { 0.0 } else { 64.0 * f64::EPSILON * highest };
         up(if error > 0.0 { error + rounding } else { error })
     }
 
@@ -277,13 +291,13 @@ pub(super) fn measure(rtin: &mut Rtin, raster: &Raster) {
     let states = if raster.voids().any() { all_states(raster, &levels) } else { Vec::new() };
     let last = [raster.columns() as u32 - 1, raster.rows() as u32 - 1];
     let exactness = Exactness::of(raster);
-    let ground = Ground { raster, exactness, levels: &levels, states, last, highest: exactness.highest };
+    let ground = Ground { raster, exactness, levels: &levels, states, last };
     let strips = (raster.rows() - 1).div_ceil(SIDE);
     let small = levels.len().min(SIZES);
     let seams: Vec<Vec<Vec<f32>>> = {
         let mut sizes = split(&mut rtin.deviations, &levels[..small], strips);
         let work = |blocks: &mut Blocks, (strip, sizes): (usize, &mut Vec<Rows>)| ground.strip(strip, sizes, blocks);
-        sizes.par_iter_mut().enumerate().for_each_init(Blocks::new, work);
+        sizes.par_iter_mut().with_min_len(4).enumerate().for_each_init(Blocks::new, work);
         sizes.into_iter().map(|sizes| sizes.into_iter().map(|rows| rows.seam).collect()).collect()
     };
     // What lies at the seams between strips, once more.
