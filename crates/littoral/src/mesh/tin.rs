@@ -15,15 +15,17 @@
 mod candidate;
 mod net;
 mod outline;
+mod tiles;
 
 use super::measure::lies_on_surface;
 use super::{MeshError, Triangulation, tolerance};
 use crate::field::Raster;
 use candidate::{Candidate, Ground};
 use net::{CHANGED, Net, OUTSIDE};
+use tiles::Tiles;
 
 /// By how much the threshold falls from phase to phase: less makes fewer triangles, and more work.
-const FALL: f32 = 0.7;
+const FALL: f32 = 0.6;
 
 /// Meshes a raster with about as few triangles as possible so that no sample of it is farther than `max_error` (m) from them,
 /// measured vertically, and none of them lies on a void. The triangulation is Delaunay but for edges on the outline of
@@ -36,12 +38,10 @@ pub fn triangulate(
     max_error: f32,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Triangulation, MeshError> {
-    let ground = Ground {
-        heights: raster.heights(),
-        columns: raster.columns(),
-        max_error: tolerance(max_error)?,
-        kept_border: None,
-    };
+    let max_error = tolerance(max_error)?;
+    let tiles = Tiles::new(raster.heights(), raster.columns());
+    let ground =
+        Ground { heights: raster.heights(), columns: raster.columns(), tiles: &tiles, max_error, kept_border: None };
     let mut net = Net::over([raster.columns() as u32 - 1, raster.rows() as u32 - 1]);
     if raster.voids().any() {
         outline::cut_out(&mut net, raster)?;

@@ -45,22 +45,52 @@ impl Side {
     }
 }
 
+/// The samples within and on the border of a triangle, row by row.
+#[derive(Clone, Copy)]
+pub(crate) struct Spans {
+    long: Side,
+    lower: Side,
+    upper: Side,
+    /// First and last row.
+    pub rows: [u32; 2],
+    /// First row of the upper side.
+    middle: u32,
+    long_is_west: bool,
+}
+
+impl Spans {
+    /// Of a triangle whose corners turn either way; none of a flat one.
+    #[inline(always)]
+    pub fn new(mut corners: [[u32; 2]; 3]) -> Option<Spans> {
+        corners.sort_unstable_by_key(|at| at[1]);
+        let [low, middle, high] = corners;
+        let turn = super::doubled_area([low, high, middle]);
+        (turn != 0).then(|| Spans {
+            long: Side::new(low, high),
+            lower: Side::new(low, middle),
+            upper: Side::new(middle, high),
+            rows: [low[1], high[1]],
+            middle: if middle[1] == high[1] { u32::MAX } else { middle[1] },
+            long_is_west: turn < 0,
+        })
+    }
+
+    /// The first and last sample of one of its rows; none where the first is beyond the last.
+    #[inline(always)]
+    pub fn row(&self, row: u32) -> (u32, u32) {
+        let short = if row < self.middle { &self.lower } else { &self.upper };
+        let (west, east) = if self.long_is_west { (&self.long, short) } else { (short, &self.long) };
+        (west.first(row), east.last(row))
+    }
+}
+
 /// Calls `visit(row, first, last)` for the samples within and on the border of a triangle, row by row; rows without any are
 /// left out. The corners may turn either way.
 #[inline(always)]
-pub(crate) fn spans(mut corners: [[u32; 2]; 3], mut visit: impl FnMut(u32, u32, u32)) {
-    corners.sort_unstable_by_key(|at| at[1]);
-    let [low, middle, high] = corners;
-    let (long, lower, upper) = (Side::new(low, high), Side::new(low, middle), Side::new(middle, high));
-    // Whether the long side is west of the corner in the middle.
-    let turn = super::doubled_area([low, high, middle]);
-    if turn == 0 {
-        return;
-    }
-    for row in low[1]..=high[1] {
-        let short = if row < middle[1] || upper.from[1] == i64::from(high[1]) { &lower } else { &upper };
-        let (west, east) = if turn < 0 { (&long, short) } else { (short, &long) };
-        let (first, last) = (west.first(row), east.last(row));
+pub(crate) fn spans(corners: [[u32; 2]; 3], mut visit: impl FnMut(u32, u32, u32)) {
+    let Some(spans) = Spans::new(corners) else { return };
+    for row in spans.rows[0]..=spans.rows[1] {
+        let (first, last) = spans.row(row);
         if first <= last {
             visit(row, first, last);
         }

@@ -53,7 +53,14 @@ impl Blocks {
 
     /// Measures the blocks with these south-western samples; `rises` tells the diagonal of all of them, `exact` which sizes
     /// of squares are computed without rounding.
-    pub fn measure(&mut self, heights: &[f32], columns: usize, corners: &[usize; LANES], rises: bool, exact: [bool; SIZES]) {
+    pub fn measure(
+        &mut self,
+        heights: &[f32],
+        columns: usize,
+        corners: &[usize; LANES],
+        rises: bool,
+        exact: [bool; SIZES],
+    ) {
         lay_out(heights, columns, corners, &mut self.samples);
         measure(&self.samples, rises, exact, &mut self.found);
     }

@@ -61,4 +61,3 @@ impl Cut {
         (2..self.count).map(|k| [self.corners[0], self.corners[k - 1], self.corners[k]])
     }
 }
-

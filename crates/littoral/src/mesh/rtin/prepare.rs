@@ -412,4 +412,3 @@ fn coarser_states(finer: &[States], under: Level, level: Level) -> Vec<States> {
     };
     (0..level.columns * level.rows).into_par_iter().map(of).collect()
 }
-
