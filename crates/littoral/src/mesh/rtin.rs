@@ -17,6 +17,7 @@
 //! simplified", 2002 (nested bounds).
 
 mod blocks;
+mod border;
 mod cut;
 mod grow;
 mod prepare;
@@ -106,13 +107,20 @@ fn halves(x: u32, y: u32, side: u32, rises: bool) -> [Corners; 2] {
 impl Rtin {
     /// Measures every deviation of a raster.
     pub fn new(raster: &Raster) -> Rtin {
-        let mut rtin = Rtin::layout([raster.columns(), raster.rows()]);
+        let mut rtin = Rtin::layout([raster.columns(), raster.rows()], 2, Vec::new());
         prepare::measure(&mut rtin, raster);
         rtin
     }
 
-    /// Where everything is, and nothing in it.
-    fn layout(size: [usize; 2]) -> Rtin {
+    /// Measures another raster in the same memory.
+    pub fn renew(&mut self, raster: &Raster) {
+        let deviations = std::mem::take(&mut self.deviations);
+        *self = Rtin::layout([raster.columns(), raster.rows()], 2, deviations);
+        prepare::measure(self, raster);
+    }
+
+    /// Where everything is in a virtual square of `side` patches a side, or of as many more as it takes, and how much it is.
+    fn places(size: [usize; 2], side: usize) -> (Rtin, usize) {
         let patches = size.map(|samples| samples - 1);
         let (mut levels, mut offset) = (Vec::new(), 0);
         for k in 1.. {
@@ -121,11 +129,24 @@ impl Rtin {
             let upright = flat + columns * (rows + 1);
             levels.push(Level { columns, rows, centres: offset, flat, upright });
             offset = upright + (columns + 1) * rows;
-            if columns * rows == 1 {
+            if columns * rows == 1 && 1 << k >= side {
                 break;
             }
         }
-        Rtin { size, levels, deviations: vec![0.0; offset] }
+        (Rtin { size, levels, deviations: Vec::new() }, offset)
+    }
+
+    /// The same with nothing in it, in the memory of earlier deviations.
+    fn layout(size: [usize; 2], side: usize, mut deviations: Vec<f32>) -> Rtin {
+        let (rtin, count) = Rtin::places(size, side);
+        if deviations.capacity() < count {
+            // Zeros from the system cost less than zeros written.
+            deviations = vec![0.0; count];
+        } else {
+            deviations.clear();
+            deviations.resize(count, 0.0);
+        }
+        Rtin { deviations, ..rtin }
     }
 
     /// Bytes of memory held.
