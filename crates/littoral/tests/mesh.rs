@@ -1,9 +1,10 @@
 //! Meshes of whole rasters: each patch covered exactly once, and no sample farther away than was asked for.
 
 use glam::DVec2;
-use littoral::field::Raster;
+use littoral::field::{Raster, Window};
 use littoral::mesh::measure::{Flaw, measure, verify, verify_delaunay};
 use littoral::mesh::rtin::Rtin;
+use littoral::mesh::tiled::{Method, Tiling};
 use littoral::mesh::{MeshError, Triangulation, tin};
 use proptest::prelude::*;
 
@@ -209,6 +210,53 @@ proptest! {
         let mesh = tin::triangulate(&raster, error, &|_| true).expect("a mesh");
         check(&raster, &mesh, error);
         assert_eq!(verify_delaunay(&raster, &mesh), Ok(()));
+    }
+}
+
+/// One mesh of the meshes of tiles: vertices at the same sample become one.
+fn union(tiles: &[(Window, Triangulation)]) -> Triangulation {
+    let mut names = std::collections::HashMap::new();
+    let mut union = Triangulation::default();
+    for (window, tile) in tiles {
+        for triangle in &tile.triangles {
+            union.triangles.push(tile.corners(*triangle).map(|at| {
+                let at = [at[0] + window.column as u32, at[1] + window.row as u32];
+                *names.entry(at).or_insert_with(|| {
+                    union.vertices.push(at);
+                    union.vertices.len() as u32 - 1
+                })
+            }));
+        }
+    }
+    union
+}
+
+/// What is in a window of a raster.
+fn part(raster: &Raster, window: Window) -> Raster {
+    let rows = window.row..window.row + window.rows;
+    let sample = |(row, column)| raster.sample(column, row).unwrap_or(f32::NAN);
+    let heights = rows.flat_map(|row| (window.column..window.column + window.columns).map(move |column| (row, column)));
+    Raster::new(window.columns, window.rows, raster.spacing(), heights.map(sample).collect()).expect("a window")
+}
+
+proptest! {
+    #![proptest_config(cases(300))]
+
+    #[test]
+    fn tiles_together_are_one_mesh(recipe in recipes(), error in errors(), shift in 1u32..6, rtin: bool) {
+        let raster = recipe.make();
+        let error = asked(&raster, error);
+        let method = if rtin { Method::Rtin } else { Method::Tin };
+        let tiling = Tiling { size: [raster.columns(), raster.rows()], side: 1 << shift };
+        let mut tiles = Vec::new();
+        let mut read = |window| Ok::<_, MeshError>(part(&raster, window));
+        let mut write = |window: Window, part: &Raster, mesh: &Triangulation| {
+            assert_eq!(verify(part, mesh), Ok(()));
+            tiles.push((window, mesh.clone()));
+            Ok(())
+        };
+        tiling.mesh(method, error, &mut read, &mut write).expect("tiles");
+        check(&raster, &union(&tiles), error);
     }
 }
 

@@ -7,7 +7,7 @@
 
 mod scan;
 
-pub(crate) use scan::{Exactness, Plane, deviation, spans};
+pub(crate) use scan::{Exactness, Plane, Spans, deviation, spans};
 
 use super::Triangulation;
 use crate::field::Raster;

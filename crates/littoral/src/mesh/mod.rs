@@ -13,6 +13,7 @@ pub use model::{Form, Model, ModelError};
 
 pub mod measure;
 pub mod rtin;
+pub mod tiled;
 pub mod tin;
 
 /// Triangles over samples of a raster.
@@ -45,6 +46,14 @@ pub enum MeshError {
         expected: [usize; 2],
         /// Columns and rows given.
         got: [usize; 2],
+    },
+    /// A raster of fewer than two samples a side, or tiles whose side is no power of two.
+    #[error("expected a raster of at least 2 samples a side and tiles of 2, 4, 8, … patches, got {size:?} and {side}")]
+    Tiles {
+        /// Samples of the raster.
+        size: [usize; 2],
+        /// Patches along the side of a tile.
+        side: usize,
     },
     /// Vertices are numbered with 32 bits.
     #[error("expected at most 2³² − 1 vertices; ask for a greater error or for a part of the raster")]

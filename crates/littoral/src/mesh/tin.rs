@@ -12,18 +12,22 @@
 //! Works this rests on: M. Garland and P. Heckbert, "Fast polygonal approximation of terrains and height fields", 1995; C.
 //! Lawson, "Software for C¹ surface interpolation", 1977.
 
+mod border;
 mod candidate;
 mod net;
 mod outline;
+mod tiles;
 
 use super::measure::lies_on_surface;
 use super::{MeshError, Triangulation, tolerance};
 use crate::field::Raster;
+pub(super) use border::border;
 use candidate::{Candidate, Ground};
-use net::{CHANGED, NONE, Net, OUTSIDE};
+use net::{CHANGED, Net, OUTSIDE};
+use tiles::Tiles;
 
 /// By how much the threshold falls from phase to phase: less makes fewer triangles, and more work.
-const FALL: f32 = 0.7;
+const FALL: f32 = 0.6;
 
 /// Meshes a raster with about as few triangles as possible so that no sample of it is farther than `max_error` (m) from them,
 /// measured vertically, and none of them lies on a void. The triangulation is Delaunay but for edges on the outline of
@@ -36,15 +40,40 @@ pub fn triangulate(
     max_error: f32,
     progress: &(dyn Fn(f64) -> bool + Sync),
 ) -> Result<Triangulation, MeshError> {
-    let ground = Ground {
-        heights: raster.heights(),
-        columns: raster.columns(),
-        max_error: tolerance(max_error)?,
-        kept_border: None,
-    };
-    let mut net = Net::over([raster.columns() as u32 - 1, raster.rows() as u32 - 1]);
+    mesh(raster, None, max_error, progress)
+}
+
+/// The same, with these vertices on the border of the raster and no others; its corners are among them always. What lies
+/// between two of them on the border is taken to be no farther than `max_error` (m) from the line between them.
+///
+/// # Errors
+/// As [`triangulate`].
+pub(crate) fn triangulate_within(
+    raster: &Raster,
+    border: &[[u32; 2]],
+    max_error: f32,
+    progress: &(dyn Fn(f64) -> bool + Sync),
+) -> Result<Triangulation, MeshError> {
+    mesh(raster, Some(border), max_error, progress)
+}
+
+fn mesh(
+    raster: &Raster,
+    border: Option<&[[u32; 2]]>,
+    max_error: f32,
+    progress: &(dyn Fn(f64) -> bool + Sync),
+) -> Result<Triangulation, MeshError> {
+    let max_error = tolerance(max_error)?;
+    let last = [raster.columns() as u32 - 1, raster.rows() as u32 - 1];
+    let tiles = Tiles::new(raster.heights(), raster.columns());
+    let kept_border = border.map(|_| last);
+    let ground = Ground { heights: raster.heights(), columns: raster.columns(), tiles: &tiles, max_error, kept_border };
+    let mut net = Net::over(last);
+    if let Some(border) = border {
+        outline::insert(&mut net, border.to_vec())?;
+    }
     if raster.voids().any() {
-        outline::cut_out(&mut net, raster)?;
+        outline::cut_out(&mut net, raster, kept_border)?;
     }
     refine(&mut net, &ground, progress)?;
     Ok(finished(net, raster))

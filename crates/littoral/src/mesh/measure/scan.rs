@@ -45,22 +45,52 @@ impl Side {
     }
 }
 
+/// The samples within and on the border of a triangle, row by row.
+#[derive(Clone, Copy)]
+pub(crate) struct Spans {
+    long: Side,
+    lower: Side,
+    upper: Side,
+    /// First and last row.
+    pub rows: [u32; 2],
+    /// First row of the upper side.
+    middle: u32,
+    long_is_west: bool,
+}
+
+impl Spans {
+    /// Of a triangle whose corners turn either way; none of a flat one.
+    #[inline(always)]
+    pub fn new(mut corners: [[u32; 2]; 3]) -> Option<Spans> {
+        corners.sort_unstable_by_key(|at| at[1]);
+        let [low, middle, high] = corners;
+        let turn = super::doubled_area([low, high, middle]);
+        (turn != 0).then(|| Spans {
+            long: Side::new(low, high),
+            lower: Side::new(low, middle),
+            upper: Side::new(middle, high),
+            rows: [low[1], high[1]],
+            middle: if middle[1] == high[1] { u32::MAX } else { middle[1] },
+            long_is_west: turn < 0,
+        })
+    }
+
+    /// The first and last sample of one of its rows; none where the first is beyond the last.
+    #[inline(always)]
+    pub fn row(&self, row: u32) -> (u32, u32) {
+        let short = if row < self.middle { &self.lower } else { &self.upper };
+        let (west, east) = if self.long_is_west { (&self.long, short) } else { (short, &self.long) };
+        (west.first(row), east.last(row))
+    }
+}
+
 /// Calls `visit(row, first, last)` for the samples within and on the border of a triangle, row by row; rows without any are
 /// left out. The corners may turn either way.
 #[inline(always)]
-pub(crate) fn spans(mut corners: [[u32; 2]; 3], mut visit: impl FnMut(u32, u32, u32)) {
-    corners.sort_unstable_by_key(|at| at[1]);
-    let [low, middle, high] = corners;
-    let (long, lower, upper) = (Side::new(low, high), Side::new(low, middle), Side::new(middle, high));
-    // Whether the long side is west of the corner in the middle.
-    let turn = super::doubled_area([low, high, middle]);
-    if turn == 0 {
-        return;
-    }
-    for row in low[1]..=high[1] {
-        let short = if row < middle[1] || upper.from[1] == i64::from(high[1]) { &lower } else { &upper };
-        let (west, east) = if turn < 0 { (&long, short) } else { (short, &long) };
-        let (first, last) = (west.first(row), east.last(row));
+pub(crate) fn spans(corners: [[u32; 2]; 3], mut visit: impl FnMut(u32, u32, u32)) {
+    let Some(spans) = Spans::new(corners) else { return };
+    for row in spans.rows[0]..=spans.rows[1] {
+        let (first, last) = spans.row(row);
         if first <= last {
             visit(row, first, last);
         }
@@ -75,20 +105,42 @@ pub(crate) struct Exactness {
 }
 
 impl Exactness {
+    /// More bits than can be counted on.
+    const NONE: Exactness = Exactness { bits: 1000 };
+
     /// Of all heights of a raster.
     pub fn of(raster: &Raster) -> Exactness {
-        let (mut lowest, mut highest) = (i32::MAX, i32::MIN);
-        for height in raster.heights() {
-            let (bits, exponent) = (height.to_bits() & 0x7f_ffff, (height.to_bits() >> 23 & 0xff) as i32);
-            let mantissa = if exponent > 0 { bits | 0x80_0000 } else { bits };
-            if mantissa != 0 {
-                let exponent = exponent.max(1);
-                lowest = lowest.min(exponent + mantissa.trailing_zeros() as i32);
-                highest = highest.max(exponent + 32 - mantissa.leading_zeros() as i32);
+        let (mut last, mut first) = (i32::MAX, 0);
+        for heights in raster.heights().chunks(1 << 14) {
+            let (lowest, highest) = digits(heights);
+            (last, first) = (last.min(lowest), first.max(highest));
+            // The exponent of the first digit, in the same count as that of the last; and what single precision can square.
+            let top = (first >> 23).max(1) as i32 + 24;
+            if last != i32::MAX && (top - last > 24 || f32::from_bits(first) > 1e18) {
+                return Exactness::NONE;
             }
         }
-        Exactness { bits: highest.checked_sub(lowest).map_or(0, |bits| bits.max(0) as u32) }
+        let top = (first >> 23).max(1) as i32 + 24;
+        Exactness { bits: if last == i32::MAX { 0 } else { (top - last) as u32 } }
     }
+}
+
+/// The lowest place of a digit that is not 0 in any number, and the greatest of them without its sign, as bits.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn digits(heights: &[f32]) -> (i32, u32) {
+    let (mut lowest, mut highest) = (i32::MAX, 0);
+    for height in heights {
+        let bits = height.to_bits() & 0x7fff_ffff;
+        let exponent = (bits >> 23) as i32;
+        let mantissa = (bits & 0x7f_ffff) | if exponent > 0 { 0x80_0000 } else { 0 };
+        // The last digit by itself, made a number whose exponent tells its place.
+        let last = (mantissa & mantissa.wrapping_neg()) as i32 as f32;
+        let place = exponent.max(1) + (last.to_bits() >> 23) as i32 - 127;
+        let place = if mantissa == 0 { i32::MAX } else { place };
+        lowest = lowest.min(place);
+        highest = highest.max(bits);
+    }
+    (lowest, highest)
 }
 
 /// The plane through the corners of a triangle, all numbers multiplied by twice its area so that no division rounds them.

@@ -1,9 +1,13 @@
 //! The sample of a triangle that is farthest from its plane.
 
-use crate::mesh::measure::{Plane, spans};
+use super::tiles::{TILE, Tiles};
+use crate::mesh::measure::{Plane, Spans, spans};
 use multiversion::multiversion;
 
 const LANES: usize = 8;
+
+/// Twice the samples of a triangle that is searched by tiles.
+const LARGE: f64 = 4096.0;
 
 /// The sample farthest from a triangle, and how far it is (m), never less than the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,6 +21,7 @@ pub(super) struct Candidate {
 pub(super) struct Ground<'a> {
     pub heights: &'a [f32],
     pub columns: usize,
+    pub tiles: &'a Tiles,
     /// The error asked for (m).
     pub max_error: f32,
     /// Last column and row, where the border must stay as it is.
@@ -30,7 +35,7 @@ impl Ground<'_> {
 
     /// The candidate of a triangle. An error of 0 means that there is none.
     pub fn candidate(&self, corners: [[u32; 2]; 3]) -> Candidate {
-        let (found, doubt) = quick(self.heights, self.columns, corners);
+        let (found, doubt) = quick(self, corners);
         if found.error + doubt <= self.max_error {
             return Candidate { error: found.error + doubt, ..found };
         }
@@ -61,9 +66,64 @@ impl Ground<'_> {
     }
 }
 
+/// What keeps lanes out: the last of these numbers but so many.
+const KEPT: [f32; 2 * LANES] = {
+    let mut kept = [-1.0; 2 * LANES];
+    let mut lane = 0;
+    while lane < LANES {
+        kept[lane] = f32::INFINITY;
+        lane += 1;
+    }
+    kept
+};
+
+/// How far samples beside each other are from a plane that is at `here` where the first is; −1 for lanes that are kept out.
+#[inline(always)]
+fn errors(here: f32, slope: f32, heights: &[f32; LANES], kept: &[f32; LANES]) -> [f32; LANES] {
+    let mut errors = [0.0; LANES];
+    for lane in 0..LANES {
+        let error = (here + slope * lane as f32 - heights[lane]).abs();
+        errors[lane] = if error < kept[lane] { error } else { kept[lane] };
+    }
+    errors
+}
+
+/// Calls `look(errors, column)` for the samples of a row of a triangle, several at once, some of them twice.
+#[inline(always)]
+fn row_errors(line: &[f32], count: usize, west: f64, east: f64, mut look: impl FnMut(&[f32; LANES], usize)) {
+    let slope = east as f32;
+    let all = KEPT.first_chunk::<LANES>().unwrap_or(&[0.0; LANES]);
+    if count >= LANES {
+        // From the start of each chunk, so that numbers stay small enough to be exact.
+        let (chunks, rest) = line[..count].as_chunks::<LANES>();
+        for (k, heights) in chunks.iter().enumerate() {
+            look(&errors((west + (k * LANES) as f64 * east) as f32, slope, heights, all), k * LANES);
+        }
+        if !rest.is_empty()
+            && let Some(heights) = line[..count].last_chunk::<LANES>()
+        {
+            let first = count - LANES;
+            look(&errors((west + first as f64 * east) as f32, slope, heights, all), first);
+        }
+    } else if let Some(kept) = KEPT[LANES - count..].first_chunk::<LANES>() {
+        match line.first_chunk::<LANES>() {
+            Some(heights) => look(&errors(west as f32, slope, heights, kept), 0),
+            None => {
+                // The end of the last row.
+                let mut heights = [0.0; LANES];
+                for (to, from) in heights.iter_mut().zip(line) {
+                    *to = *from;
+                }
+                look(&errors(west as f32, slope, &heights, kept), 0);
+            }
+        }
+    }
+}
+
 /// The candidate in single precision, and a bound of what rounding may have changed of its error.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn quick(heights: &[f32], columns: usize, corners: [[u32; 2]; 3]) -> (Candidate, f32) {
+fn quick(ground: &Ground, corners: [[u32; 2]; 3]) -> (Candidate, f32) {
+    let (heights, columns) = (ground.heights, ground.columns);
     let height = |at: [u32; 2]| heights[at[1] as usize * columns + at[0] as usize];
     let [a, b, c] = corners;
     let from_a = |at: [u32; 2]| [0, 1].map(|axis| f64::from(at[axis]) - f64::from(a[axis]));
@@ -72,51 +132,170 @@ fn quick(heights: &[f32], columns: usize, corners: [[u32; 2]; 3]) -> (Candidate,
     let (rise_b, rise_c) = (f64::from(height(b)) - base, f64::from(height(c)) - base);
     let inverse = 1.0 / (bx * cy - by * cx);
     let (east, north) = ((rise_b * cy - rise_c * by) * inverse, (rise_c * bx - rise_b * cx) * inverse);
-    let slope = east as f32;
-    let mut steps = [0f32; LANES];
-    for (lane, step) in steps.iter_mut().enumerate() {
-        *step = lane as f32;
-    }
-    let mut best = [-1f32; LANES];
-    let (mut best_column, mut best_row) = ([0u32; LANES], [0u32; LANES]);
-    spans(corners, |row, first, last| {
-        let start = row as usize * columns;
-        let west = base + (f64::from(row) - f64::from(a[1])) * north + (f64::from(first) - f64::from(a[0])) * east;
-        let mut column = first;
-        while column <= last {
-            let from = start + column as usize;
-            let mut lanes = [0f32; LANES];
-            match heights.get(from..from + LANES) {
-                Some(all) => lanes.copy_from_slice(all),
-                None => lanes[..heights.len() - from].copy_from_slice(&heights[from..]),
-            }
-            // From the start of each chunk, so that numbers stay small enough to be exact.
-            let (here, count) = ((west + f64::from(column - first) * east) as f32, last - column + 1);
-            for lane in 0..LANES {
-                let error = (here + slope * steps[lane] - lanes[lane]).abs();
-                let better = error > best[lane] && (lane as u32) < count;
-                best[lane] = if better { error } else { best[lane] };
-                best_column[lane] = if better { column } else { best_column[lane] };
-                best_row[lane] = if better { row } else { best_row[lane] };
-            }
-            column += LANES as u32;
-        }
-    });
-    let mut found = Candidate { at: a, error: -1.0 };
-    for lane in 0..LANES {
-        let at = [best_column[lane] + lane as u32, best_row[lane]];
-        if best[lane] > found.error || (best[lane] == found.error && [at[1], at[0]] < [found.at[1], found.at[0]]) {
-            found = Candidate { at, error: best[lane] };
-        }
-    }
+    let west_of = |row: u32, first: u32| {
+        base + (f64::from(row) - f64::from(a[1])) * north + (f64::from(first) - f64::from(a[0])) * east
+    };
     let highest = corners.into_iter().map(|at| height(at).abs()).fold(0.0, f32::max);
+    // Six roundings of numbers not above twice the corners', and one of the difference; a slender triangle's plane is steep.
+    let slender = (bx.abs() + cx.abs()) * (by.abs() + cy.abs()) * inverse * 16.0 * f64::EPSILON;
+    let doubt = (f32::EPSILON * 4.0 + slender as f32) * highest + f32::MIN_POSITIVE;
+    let mut found = Candidate { at: a, error: -1.0 };
+    let Some(spans) = Spans::new(corners) else { return (found, f32::INFINITY) };
+    let area = (bx * cy - by * cx).abs();
+    if area < LARGE {
+        small(ground, &spans, west_of, east, &mut found);
+    } else {
+        large(ground, &spans, west_of, [east, north], doubt, &mut found);
+    }
     // Where numbers overflow, nothing is known.
     if found.error < 0.0 || highest > 1e37 || found.error > 1e37 {
         return (Candidate { error: 0.0, ..found }, f32::INFINITY);
     }
-    // Six roundings of numbers not above twice the corners', and one of the difference; a slender triangle's plane is steep.
-    let slender = (bx.abs() + cx.abs()) * (by.abs() + cy.abs()) * inverse * 16.0 * f64::EPSILON;
-    let relative = (f32::EPSILON * 4.0 + slender as f32) * highest + f32::EPSILON * 2.0 * found.error;
-    let doubt = relative + f32::MIN_POSITIVE;
-    (found, doubt)
+    (found, doubt + f32::EPSILON * 2.0 * found.error)
+}
+
+/// Looks at all samples.
+#[inline(always)]
+fn small(ground: &Ground, spans: &Spans, west_of: impl Fn(u32, u32) -> f64, east: f64, found: &mut Candidate) {
+    let mut best = [-1f32; LANES];
+    for row in spans.rows[0]..=spans.rows[1] {
+        let (first, last) = spans.row(row);
+        if first <= last {
+            let line = &ground.heights[row as usize * ground.columns + first as usize..];
+            row_errors(line, (last - first + 1) as usize, west_of(row, first), east, |errors, _| {
+                for lane in 0..LANES {
+                    best[lane] = if errors[lane] > best[lane] { errors[lane] } else { best[lane] };
+                }
+            });
+        }
+    }
+    for error in best {
+        found.error = if error > found.error { error } else { found.error };
+    }
+    // Where it is does not matter if nothing comes of it.
+    if found.error * 1.01 < ground.max_error {
+        return;
+    }
+    for row in spans.rows[0]..=spans.rows[1] {
+        let (first, last) = spans.row(row);
+        if first <= last {
+            let line = &ground.heights[row as usize * ground.columns + first as usize..];
+            let mut at = u32::MAX;
+            row_errors(line, (last - first + 1) as usize, west_of(row, first), east, |errors, column| {
+                let mut hits = 0;
+                for lane in 0..LANES {
+                    hits |= u32::from(errors[lane] == found.error) << lane;
+                }
+                if hits != 0 && at == u32::MAX {
+                    at = first + column as u32 + hits.trailing_zeros();
+                }
+            });
+            if at != u32::MAX {
+                found.at = [at, row];
+                return;
+            }
+        }
+    }
+}
+
+/// Looks at those squares of samples only whose range leaves room for a greater error than found so far, first at the one
+/// that leaves most.
+#[inline(always)]
+fn large(
+    ground: &Ground,
+    spans: &Spans,
+    west_of: impl Fn(u32, u32) -> f64,
+    [east, north]: [f64; 2],
+    doubt: f32,
+    found: &mut Candidate,
+) {
+    let tiles = ground.tiles;
+    // Half the way that the plane rises across a square, and what rounding hides.
+    let slack = ((east.abs() + north.abs()) * (0.5 * (TILE - 1) as f64)) as f32 * 1.001 + 4.0 * doubt;
+    let middle = 0.5 * (TILE - 1) as f64;
+    let (mut most, mut likeliest) = (-1f32, [0; 2]);
+    let band = |y: usize| {
+        let rows = [spans.rows[0].max((y * TILE) as u32), spans.rows[1].min((y * TILE + TILE - 1) as u32)];
+        // Edges are straight: in a band they are farthest out at its first or last row, or where the short edges meet.
+        let mut extent = [u32::MAX, 0];
+        for row in rows[0]..=rows[1] {
+            let (first, last) = spans.row(row);
+            if first <= last {
+                extent = [extent[0].min(first), extent[1].max(last)];
+            }
+        }
+        (rows, extent)
+    };
+    // The greatest error that there could be in each of 16 squares beside each other.
+    let room = |x: usize, y: usize, count: usize| {
+        let mut room = [-1f32; 16];
+        let first = y * tiles.columns + x;
+        let (low, high) = (&tiles.low[first..first + count], &tiles.high[first..first + count]);
+        let west = west_of((y * TILE) as u32, (x * TILE) as u32) + middle * (east + north);
+        let (here, step) = (west as f32, (east * TILE as f64) as f32);
+        for k in 0..count {
+            let plane = here + step * k as f32;
+            let (above, below) = (high[k] - plane, plane - low[k]);
+            room[k] = if above > below { above } else { below } + slack;
+        }
+        room
+    };
+    let bands = spans.rows[0] as usize / TILE..=spans.rows[1] as usize / TILE;
+    for y in bands.clone() {
+        let (_, [first, last]) = band(y);
+        if first > last {
+            continue;
+        }
+        let (first, last) = (first as usize / TILE, last as usize / TILE);
+        for x in (first..=last).step_by(16) {
+            for (k, &room) in room(x, y, 16.min(last + 1 - x)).iter().enumerate() {
+                if room > most {
+                    (most, likeliest) = (room, [x + k, y]);
+                }
+            }
+        }
+    }
+    look(ground, spans, &west_of, east, likeliest[0], band(likeliest[1]).0, found);
+    for y in bands {
+        let (rows, [first, last]) = band(y);
+        if first > last {
+            continue;
+        }
+        let (first, last) = (first as usize / TILE, last as usize / TILE);
+        for x in (first..=last).step_by(16) {
+            for (k, &room) in room(x, y, 16.min(last + 1 - x)).iter().enumerate() {
+                if room > found.error && [x + k, y] != likeliest {
+                    look(ground, spans, &west_of, east, x + k, rows, found);
+                }
+            }
+        }
+    }
+}
+
+/// Looks at the samples of a triangle in one square.
+#[inline(always)]
+fn look(
+    ground: &Ground,
+    spans: &Spans,
+    west_of: &impl Fn(u32, u32) -> f64,
+    east: f64,
+    x: usize,
+    rows: [u32; 2],
+    found: &mut Candidate,
+) {
+    for row in rows[0]..=rows[1] {
+        let (first, last) = spans.row(row);
+        let (first, last) = (first.max((x * TILE) as u32), last.min((x * TILE + TILE - 1) as u32));
+        if first > last {
+            continue;
+        }
+        let line = &ground.heights[row as usize * ground.columns + first as usize..];
+        row_errors(line, (last - first + 1) as usize, west_of(row, first), east, |errors, column| {
+            for (lane, &error) in errors.iter().enumerate() {
+                if error > found.error {
+                    *found = Candidate { at: [first + (column + lane) as u32, row], error };
+                }
+            }
+        });
+    }
 }

@@ -8,19 +8,15 @@ use std::collections::HashSet;
 type Segment = [[u32; 2]; 2];
 
 /// Makes the outline of the surface edges of the net, fixes them, and marks the triangles beyond.
-pub(super) fn cut_out(net: &mut Net, raster: &Raster) -> Result<(), MeshError> {
+/// Where the border is kept, its pieces are edges already, with the corners of the outline among their ends.
+pub(super) fn cut_out(net: &mut Net, raster: &Raster, kept_border: Option<[u32; 2]>) -> Result<(), MeshError> {
     let mut segments = segments(raster);
+    if let Some(last) = kept_border {
+        segments.retain(|[a, b]| !(0..2).any(|i| a[i] == b[i] && (a[i] == 0 || a[i] == last[i])));
+    }
     let mut places: Vec<[u32; 2]> = segments.iter().flatten().copied().collect();
-    let mut near = 0;
     while !places.is_empty() {
-        shuffle(&mut places);
-        for at in places.drain(..) {
-            if net.triangles() > u32::MAX as usize / 3 - 8 {
-                return Err(MeshError::TooMany);
-            }
-            near = net.locate(at, near);
-            net.insert(at, near);
-        }
+        insert(net, std::mem::take(&mut places))?;
         // Edges that lie along an axis; what is missing of the outline is halved.
         let edges: HashSet<Segment> = (0..net.corners.len() as u32).filter_map(|edge| along_axis(net, edge)).collect();
         let mut halved = Vec::with_capacity(segments.len());
@@ -47,6 +43,20 @@ pub(super) fn cut_out(net: &mut Net, raster: &Raster) -> Result<(), MeshError> {
         if !lies_on_surface(raster, net.triangle(triangle)) {
             net.flags[triangle as usize] |= OUTSIDE;
         }
+    }
+    Ok(())
+}
+
+/// Makes samples vertices.
+pub(super) fn insert(net: &mut Net, mut places: Vec<[u32; 2]>) -> Result<(), MeshError> {
+    shuffle(&mut places);
+    let mut near = 0;
+    for at in places {
+        if net.triangles() > u32::MAX as usize / 3 - 8 {
+            return Err(MeshError::TooMany);
+        }
+        near = net.locate(at, near);
+        net.insert(at, near);
     }
     Ok(())
 }

@@ -1,0 +1,414 @@
+//! Measuring all deviations.
+//!
+//! The raster is worked on in strips of 64 rows of patches, each by itself, with small squares in blocks ([`super::blocks`]);
+//! large ones follow from small ones ([`super::search`]); what is cut by the raster's border or partly void is measured one
+//! triangle after the other. A side between two strips has a triangle in each, so that what depends on it is raised once more in the end.
+//! Greatest numbers do not depend on the order they are compared in: any number of threads finds the same bits.
+
+use super::blocks::{self, Blocks, LANES, SIDE, SIZES};
+use super::cut::Cut;
+use super::search::{self, Stack};
+use super::{Corners, Level, Part, Rtin, halves, quarter, rises};
+use crate::field::Raster;
+use crate::mesh::measure::{Exactness, deviation, patch_exists};
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+/// Rounded up.
+fn up(deviation: f64) -> f32 {
+    let nearest = deviation as f32;
+    if f64::from(nearest) < deviation { nearest.next_up() } else { nearest }
+}
+
+/// What there is of the surface in the four quarters of a square, two bits each: something, and something void.
+type States = u8;
+const SOLID: u8 = 1;
+const VOID: u8 = 2;
+const ALL_SOLID: States = 0b0101_0101;
+
+fn state(states: States, part: Part) -> u8 {
+    states >> (2 * part as u8) & 3
+}
+
+/// States of the halves of a square.
+fn half_states(states: States, rises: bool) -> [u8; 2] {
+    let of = |part| state(states, part);
+    if rises {
+        [of(Part::South) | of(Part::East), of(Part::North) | of(Part::West)]
+    } else {
+        [of(Part::South) | of(Part::West), of(Part::North) | of(Part::East)]
+    }
+}
+
+/// The greatest errors of a square: of its halves, and of its southern, eastern, northern and western quarter (m).
+type Errors = [f32; 5];
+
+/// The deviations of a strip's squares of one size.
+struct Rows<'a> {
+    /// Columns of squares, and rows of them in this strip.
+    columns: usize,
+    rows: usize,
+    centres: &'a mut [f32],
+    /// Lines of sides from the southern one on; the northernmost is the next strip's, except at the raster's border.
+    flat: &'a mut [f32],
+    upright: &'a mut [f32],
+    /// What this strip finds for the next one's first line.
+    seam: Vec<f32>,
+}
+
+impl Rows<'_> {
+    fn line(&mut self, line: usize) -> &mut [f32] {
+        let columns = self.columns;
+        match self.flat.len() > line * columns {
+            true => &mut self.flat[line * columns..][..columns],
+            false => &mut self.seam,
+        }
+    }
+
+    /// Notes what was found of a square.
+    fn raise(&mut self, x: usize, y: usize, [centre, south, east, north, west]: Errors) {
+        let columns = self.columns;
+        raise(&mut self.centres[y * columns + x], centre);
+        raise(&mut self.line(y)[x], south);
+        raise(&mut self.line(y + 1)[x], north);
+        raise(&mut self.upright[y * (columns + 1) + x], west);
+        raise(&mut self.upright[y * (columns + 1) + x + 1], east);
+    }
+
+    /// Raises sides to the centres of the next finer size, and centres to their sides.
+    fn nest(&mut self, finer: Option<(&[f32], usize)>) {
+        for y in 0..self.rows {
+            if let Some((centres, wide)) = finer {
+                for (j, centres) in centres.chunks_exact(wide).skip(2 * y).take(2).enumerate() {
+                    raise_flat(self.line(y + j), centres);
+                    raise_upright(&mut self.upright[y * (self.columns + 1)..][..self.columns + 1], centres);
+                }
+            }
+        }
+        for y in 0..self.rows {
+            let columns = self.columns;
+            let (south, north) = (y * columns, (y + 1) * columns);
+            let north: &[f32] = if self.flat.len() > north { &self.flat[north..][..columns] } else { &self.seam };
+            let upright = &self.upright[y * (columns + 1)..][..columns + 1];
+            raise_centres(&mut self.centres[south..][..columns], &self.flat[south..][..columns], north, upright);
+        }
+    }
+}
+
+fn raise(kept: &mut f32, found: f32) {
+    if found > *kept {
+        *kept = found;
+    }
+}
+
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn raise_flat(sides: &mut [f32], centres: &[f32]) {
+    let (pairs, last) = centres.as_chunks::<2>();
+    for (side, [a, b]) in sides.iter_mut().zip(pairs) {
+        *side = greater(*side, greater(*a, *b));
+    }
+    if let [last] = last {
+        sides[pairs.len()] = greater(sides[pairs.len()], *last);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn raise_upright(sides: &mut [f32], centres: &[f32]) {
+    sides[0] = greater(sides[0], centres[0]);
+    let (pairs, last) = centres[1..].as_chunks::<2>();
+    for (side, [a, b]) in sides[1..].iter_mut().zip(pairs) {
+        *side = greater(*side, greater(*a, *b));
+    }
+    if let [last] = last {
+        sides[1 + pairs.len()] = greater(sides[1 + pairs.len()], *last);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn raise_centres(centres: &mut [f32], south: &[f32], north: &[f32], upright: &[f32]) {
+    let n = centres.len();
+    let (centres, south, north) = (&mut centres[..n], &south[..n], &north[..n]);
+    let (west, east) = (&upright[..n], &upright[1..][..n]);
+    for x in 0..n {
+        let sides = greater(greater(south[x], north[x]), greater(west[x], east[x]));
+        centres[x] = greater(centres[x], sides);
+    }
+}
+
+/// What all strips need to know.
+struct Ground<'a> {
+    raster: &'a Raster,
+    exactness: Exactness,
+    levels: &'a [Level],
+    /// States of all squares of each size; empty where nothing is void.
+    states: Vec<Vec<States>>,
+    last: [u32; 2],
+}
+
+impl Ground<'_> {
+    fn states(&self, k: usize, x: usize, y: usize) -> States {
+        self.states.get(k).map_or(ALL_SOLID, |states| states[y * self.levels[k].columns + x])
+    }
+
+    /// Whether a square lies in the raster, nothing of it void.
+    fn whole(&self, k: usize, x: usize, y: usize) -> bool {
+        let side = 2usize << k;
+        let inside = (x + 1) * side <= self.last[0] as usize && (y + 1) * side <= self.last[1] as usize;
+        inside && self.states(k, x, y) == ALL_SOLID
+    }
+
+    /// Whether single precision rounds nothing in squares of a size.
+    fn exact(&self, k: usize) -> bool {
+        self.exactness.bits + 2 + k as u32 + 1 <= 24
+    }
+
+    /// The greatest errors of any square, triangle by triangle.
+    fn square(&self, k: usize, x: usize, y: usize, one: &mut dyn FnMut(Corners, u8) -> f32) -> Errors {
+        let (side, states) = (2u32 << k, self.states(k, x, y));
+        let (west, south) = (x as u32 * side, y as u32 * side);
+        let [state_a, state_b] = half_states(states, rises(x, y));
+        let [a, b] = halves(west, south, side, rises(x, y));
+        let centre = one(a, state_a).max(one(b, state_b));
+        let mut part = |part| one(quarter(west, south, side, part), state(states, part));
+        [centre, part(Part::South), part(Part::East), part(Part::North), part(Part::West)]
+    }
+
+    /// The greatest error of a triangle that may be cut or partly void, from all of its samples.
+    fn any(&self, corners: Corners, state: u8) -> f32 {
+        match state {
+            _ if state == SOLID | VOID => f32::INFINITY,
+            SOLID => {
+                let measure =
+                    |corners| deviation(self.raster.heights(), self.raster.columns(), self.exactness, corners);
+                up(Cut::new(corners, self.last).triangles().map(measure).fold(0.0, f64::max))
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// The greatest error of a large triangle, from smaller ones where it is whole.
+    fn large(&self, rtin: &Rtin, stack: &mut Stack, corners: Corners, state: u8) -> f32 {
+        if state != SOLID || corners.iter().any(|at| at[0] > self.last[0] || at[1] > self.last[1]) {
+            return self.any(corners, state);
+        }
+        // The right angle is at the corner that the others are equally far from.
+        let [a, b, c] = corners;
+        let squared = |p: [u32; 2], q: [u32; 2]| {
+            [0, 1].map(|i| (i64::from(p[i]) - i64::from(q[i])).pow(2)).into_iter().sum::<i64>()
+        };
+        let longest = squared(a, b).max(squared(b, c)).max(squared(c, a));
+        let turned = match longest {
+            _ if longest == squared(a, b) => [a, b, c],
+            _ if longest == squared(b, c) => [b, c, a],
+            _ => [c, a, b],
+        };
+        let heights = self.raster.heights();
+        let error = search::deviation(rtin, heights, turned, stack);
+        // Halving heights time and again may round them, unless they have few digits.
+        let highest = corners
+            .map(|at| f64::from(heights[at[1] as usize * self.raster.columns() + at[0] as usize]).abs())
+            .into_iter()
+            .fold(0.0, f64::max);
+        let rounding = if self.exactness.bits <= 24 { 0.0 } else { 64.0 * f64::EPSILON * highest };
+        up(if error > 0.0 { error + rounding } else { error })
+    }
+
+    /// Measures all small squares of a strip.
+    fn strip(&self, strip: usize, sizes: &mut [Rows], blocks: &mut Blocks) {
+        let columns = self.raster.columns();
+        let mut lists = [Vec::new(), Vec::new()];
+        for x in 0..(columns - 1).div_ceil(SIDE) {
+            if sizes.len() == SIZES && self.whole(SIZES - 1, x, strip) {
+                lists[usize::from(rises(x, strip))].push(x);
+            } else {
+                self.block(strip, x, sizes);
+            }
+        }
+        for (rises, list) in [false, true].into_iter().zip(lists) {
+            for group in list.chunks(LANES) {
+                // Fewer blocks than lanes: the last one several times.
+                let block: [usize; LANES] = std::array::from_fn(|lane| group[lane.min(group.len() - 1)]);
+                let corners = block.map(|x| (strip * columns + x) * SIDE);
+                let exact = std::array::from_fn(|k| self.exact(k));
+                blocks.measure(self.raster.heights(), columns, &corners, rises, exact);
+                for (k, rows) in sizes.iter_mut().enumerate() {
+                    collect(blocks, k, &block[..group.len()], rows);
+                }
+            }
+        }
+        for k in 0..sizes.len() {
+            let (finer, rest) = sizes.split_at_mut(k);
+            rest[0].nest(finer.last().map(|finer| (&*finer.centres, finer.columns)));
+        }
+    }
+
+    /// All small squares of a block, one by one.
+    fn block(&self, strip: usize, block: usize, sizes: &mut [Rows]) {
+        for (k, rows) in sizes.iter_mut().enumerate() {
+            let across = blocks::across(k);
+            for y in 0..rows.rows {
+                for x in block * across..((block + 1) * across).min(rows.columns) {
+                    let errors = self.square(k, x, strip * across + y, &mut |corners, state| self.any(corners, state));
+                    rows.raise(x, y, errors);
+                }
+            }
+        }
+    }
+}
+
+/// Takes over what was found in blocks side by side.
+fn collect(blocks: &Blocks, k: usize, list: &[usize], rows: &mut Rows) {
+    let (across, columns) = (blocks::across(k), rows.columns);
+    for y in 0..across {
+        let row = blocks.row(k, 0, y);
+        for (lane, block) in list.iter().enumerate() {
+            let centres = &mut rows.centres[y * columns + block * across..][..across];
+            centres.iter_mut().zip(row).for_each(|(centre, found)| *centre = found[lane]);
+        }
+        let row = blocks.row(k, 2, y);
+        for (lane, block) in list.iter().enumerate() {
+            let sides = &mut rows.upright[y * (columns + 1) + block * across..][..across + 1];
+            sides.iter_mut().zip(row).for_each(|(side, found)| raise(side, found[lane]));
+        }
+    }
+    for y in 0..=across {
+        let (row, line) = (blocks.row(k, 1, y), rows.line(y));
+        for (lane, block) in list.iter().enumerate() {
+            let sides = &mut line[block * across..][..across];
+            sides.iter_mut().zip(row).for_each(|(side, found)| *side = found[lane]);
+        }
+    }
+}
+
+/// Measures every deviation of a raster.
+pub(super) fn measure(rtin: &mut Rtin, raster: &Raster) {
+    let levels = rtin.levels.clone();
+    let states = if raster.voids().any() { all_states(raster, &levels) } else { Vec::new() };
+    let last = [raster.columns() as u32 - 1, raster.rows() as u32 - 1];
+    let exactness = Exactness::of(raster);
+    let ground = Ground { raster, exactness, levels: &levels, states, last };
+    let strips = (raster.rows() - 1).div_ceil(SIDE);
+    let small = levels.len().min(SIZES);
+    let seams: Vec<Vec<Vec<f32>>> = {
+        let mut sizes = split(&mut rtin.deviations, &levels[..small], strips);
+        let work = |blocks: &mut Blocks, (strip, sizes): (usize, &mut Vec<Rows>)| ground.strip(strip, sizes, blocks);
+        sizes.par_iter_mut().with_min_len(4).enumerate().for_each_init(Blocks::new, work);
+        sizes.into_iter().map(|sizes| sizes.into_iter().map(|rows| rows.seam).collect()).collect()
+    };
+    // What lies at the seams between strips, once more.
+    for (strip, seams) in seams.into_iter().enumerate() {
+        for (k, seam) in seams.into_iter().enumerate() {
+            let (level, y) = (levels[k], (strip + 1) * blocks::across(k));
+            if y <= level.rows {
+                let line = &mut rtin.deviations[level.flat(0, y)..][..level.columns];
+                line.iter_mut().zip(seam).for_each(|(side, found)| raise(side, found));
+                nest(rtin, k, y - 1..level.rows.min(y + 1));
+            }
+        }
+    }
+    for k in small..levels.len() {
+        let level = levels[k];
+        let known = &*rtin;
+        let work = |stack: &mut Stack, index: usize| {
+            let (x, y) = (index % level.columns, index / level.columns);
+            ground.square(k, x, y, &mut |corners, state| ground.large(known, stack, corners, state))
+        };
+        let squares: Vec<Errors> =
+            (0..level.columns * level.rows).into_par_iter().map_init(Stack::default, work).collect();
+        for (index, [centre, south, east, north, west]) in squares.into_iter().enumerate() {
+            let (x, y) = (index % level.columns, index / level.columns);
+            let deviations = &mut rtin.deviations;
+            raise(&mut deviations[level.centre(x, y)], centre);
+            raise(&mut deviations[level.flat(x, y)], south);
+            raise(&mut deviations[level.flat(x, y + 1)], north);
+            raise(&mut deviations[level.upright(x, y)], west);
+            raise(&mut deviations[level.upright(x + 1, y)], east);
+        }
+        nest(rtin, k, 0..level.rows);
+    }
+}
+
+/// Raises what belongs to some rows of squares to its children.
+fn nest(rtin: &mut Rtin, k: usize, rows: std::ops::Range<usize>) {
+    let level = rtin.levels[k];
+    // Finer sizes lie before coarser ones, and centres before sides.
+    let (before, here) = rtin.deviations.split_at_mut(level.centres);
+    let (centres, sides) = here.split_at_mut(level.flat - level.centres);
+    let (flat, upright) = sides.split_at_mut(level.upright - level.flat);
+    let columns = level.columns;
+    for y in rows.clone().filter(|_| k > 0) {
+        let finer = rtin.levels[k - 1];
+        for j in 0..2.min(finer.rows - 2 * y) {
+            let centres = &before[finer.centre(0, 2 * y + j)..][..finer.columns];
+            raise_flat(&mut flat[(y + j) * columns..][..columns], centres);
+            raise_upright(&mut upright[y * (columns + 1)..][..columns + 1], centres);
+        }
+    }
+    for y in rows {
+        let (south, north) = (&flat[y * columns..][..columns], &flat[(y + 1) * columns..][..columns]);
+        let upright = &upright[y * (columns + 1)..][..columns + 1];
+        raise_centres(&mut centres[y * columns..][..columns], south, north, upright);
+    }
+}
+
+/// The deviations of small squares, strip by strip.
+fn split<'a>(mut deviations: &'a mut [f32], levels: &[Level], strips: usize) -> Vec<Vec<Rows<'a>>> {
+    let mut sizes: Vec<Vec<Rows>> = (0..strips).map(|_| Vec::new()).collect();
+    for (k, level) in levels.iter().enumerate() {
+        let (centres, rest) = deviations.split_at_mut(level.columns * level.rows);
+        let (flat, rest) = rest.split_at_mut(level.columns * (level.rows + 1));
+        let (upright, rest) = rest.split_at_mut((level.columns + 1) * level.rows);
+        deviations = rest;
+        let (columns, across) = (level.columns, blocks::across(k));
+        let chunks = centres.chunks_mut(columns * across).zip(flat.chunks_mut(columns * across));
+        let chunks = chunks.zip(upright.chunks_mut((columns + 1) * across));
+        for (strip, ((centres, flat), upright)) in sizes.iter_mut().zip(chunks) {
+            let rows = centres.len() / columns;
+            strip.push(Rows { columns, rows, centres, flat, upright, seam: vec![0.0; columns] });
+        }
+    }
+    sizes
+}
+
+/// States of the squares of every size.
+fn all_states(raster: &Raster, levels: &[Level]) -> Vec<Vec<States>> {
+    let mut states = vec![finest_states(raster, levels[0])];
+    for k in 1..levels.len() {
+        states.push(coarser_states(&states[k - 1], levels[k - 1], levels[k]));
+    }
+    states
+}
+
+/// Two bits of each quarter of each square of two patches a side.
+fn finest_states(raster: &Raster, level: Level) -> Vec<States> {
+    let patch = |x: usize, y: usize| match x + 1 < raster.columns() && y + 1 < raster.rows() {
+        false => 0,
+        true if patch_exists(raster, x as i64, y as i64) => SOLID,
+        true => VOID,
+    };
+    let of = |i: usize| {
+        let (x, y) = (2 * (i % level.columns), 2 * (i / level.columns));
+        let [a, b, c, d] = [patch(x, y), patch(x + 1, y), patch(x, y + 1), patch(x + 1, y + 1)];
+        (a | b) | (b | d) << 2 | (c | d) << 4 | (a | c) << 6
+    };
+    (0..level.columns * level.rows).into_par_iter().map(of).collect()
+}
+
+/// The same for squares of twice the side.
+fn coarser_states(finer: &[States], under: Level, level: Level) -> Vec<States> {
+    let halves = |x: usize, y: usize| match x < under.columns && y < under.rows {
+        true => half_states(finer[y * under.columns + x], rises(x, y)),
+        false => [0; 2],
+    };
+    let of = |i: usize| {
+        let (x, y) = (2 * (i % level.columns), 2 * (i / level.columns));
+        let [a, b, c, d] = [halves(x, y), halves(x + 1, y), halves(x, y + 1), halves(x + 1, y + 1)];
+        (a[0] | b[0]) | (b[1] | d[0]) << 2 | (c[1] | d[1]) << 4 | (a[1] | c[0]) << 6
+    };
+    (0..level.columns * level.rows).into_par_iter().map(of).collect()
+}
