@@ -6,12 +6,14 @@ use crate::plot::ending;
 use crate::render::check_output;
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use glam::{DAffine2, DVec2, DVec4};
-use littoral::field::{Land, coast};
+use littoral::field::{HeightRange, Raster, Window, coast};
 use littoral::mesh::measure::measure;
-use littoral::mesh::{Form, Model, Triangulation, rtin, tin};
+use littoral::mesh::tiled::{self, Tiling};
+use littoral::mesh::{Form, MeshError, ModelError, Pieces, Triangulation, rtin, tin};
 use littoral_data::write::{self, MeshFormat};
 use littoral_data::{Crs, name_of_all};
 use serde::Serialize;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -71,9 +73,10 @@ pub struct Mesh {
     /// Only the samples of a part: two opposite corners of it
     #[arg(long, value_name = "X,Y,X,Y", value_parser = input::window, help_heading = "Data")]
     window: Option<DVec4>,
-    /// Use all samples of the file, however many; otherwise files of more than 128 million become coarser first
-    #[arg(long, conflicts_with = "window", help_heading = "Data")]
-    full: bool,
+    /// Mesh in tiles of so many samples a side, a power of two, which takes less memory: their meshes join without a gap
+    /// [default: 4096 for more than 64 million samples, else no tiles]
+    #[arg(long, value_name = "SAMPLES", value_parser = tile_side, help_heading = "Data")]
+    tile: Option<usize>,
     #[command(flatten)]
     reading: Reading,
 }
@@ -98,8 +101,16 @@ fn max_error(text: &str) -> Result<f64, String> {
     }
 }
 
-/// At most so many samples are taken without `--full`.
-const FITTING: usize = 128 << 20;
+fn tile_side(text: &str) -> Result<usize, String> {
+    let wrong = || format!("expected a power of two from 2 to 16384, got \"{}\"", text.trim());
+    let side = text.trim().parse::<usize>().map_err(|_| wrong())?;
+    if side.is_power_of_two() && (2..=16_384).contains(&side) { Ok(side) } else { Err(wrong()) }
+}
+
+/// More samples than this are meshed in tiles.
+const IN_ONE_PIECE: usize = 64 << 20;
+/// Samples along the side of these.
+const TILE: usize = 4096;
 
 /// What X and Y of the mesh are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,13 +123,46 @@ enum Coordinates {
 /// The ground to be meshed.
 struct Ground {
     name: String,
-    land: Land,
     frame: Frame,
     /// What heights are counted from, in words.
     datum: String,
     /// The distance between heights that the file can tell apart (m).
     step: f64,
-    built_in: bool,
+    /// Distance between samples (m).
+    spacing: DVec2,
+    /// Columns and rows.
+    size: [usize; 2],
+    /// Local metres, and the file's coordinates, of column and row.
+    local_from_lattice: DAffine2,
+    crs_from_lattice: DAffine2,
+    samples: Samples,
+}
+
+/// Where samples come from.
+enum Samples {
+    /// The built-in coast.
+    Coast(Raster),
+    /// A window of a file.
+    File(Box<Opened>, Window),
+}
+
+/// What was made of the samples.
+struct Meshed {
+    pieces: Pieces,
+    max_error: f64,
+    void: usize,
+}
+
+/// Why tiles were not meshed.
+enum Stopped {
+    Mesh(MeshError),
+    Told(Failure),
+}
+
+impl From<MeshError> for Stopped {
+    fn from(error: MeshError) -> Stopped {
+        Stopped::Mesh(error)
+    }
 }
 
 #[derive(Serialize)]
@@ -160,29 +204,29 @@ impl Mesh {
         check_output(&self.out, &inputs)?;
         let Some(format) = MeshFormat::of_name(&self.out) else { unreachable!("endings are those of formats") };
 
-        let ground = self.ground(talk)?;
-        let (land, raster) = (&ground.land, ground.land.raster());
-        let failure = |problem: &str| Failure::Work(format!("{}: {problem}", ground.name));
-        let range = land.height_range();
-        let asked =
-            self.max_error.unwrap_or_else(|| suiting(f64::from(range.high) - f64::from(range.low), ground.step));
-        let base = base.map(|height| height.unwrap_or_else(|| self.below(land)));
-        if let Some(base) = base.filter(|&base| base >= f64::from(range.low)) {
-            let (low, base) = (range.low, tidy(base, 3));
-            return Err(failure(&format!(
-                "expected --base below the lowest ground, {low} m, got {base} m; choose a lower one"
-            )));
+        let mut ground = self.ground(talk)?;
+        let samples = ground.size[0] * ground.size[1];
+        let tile = self.tile.or((samples > IN_ONE_PIECE).then_some(TILE));
+        // In one piece all is known at once; of tiles, only if what was not asked for has to be chosen.
+        let whole = if tile.is_none() { Some(ground.read(None, talk)?) } else { None };
+        let range = match &whole {
+            Some(raster) => Some(raster.range()),
+            None if self.max_error.is_none() => Some(ground.survey(talk)?),
+            None => None,
+        };
+        let relief = range.map_or(0.0, |range| f64::from(range.high) - f64::from(range.low));
+        let asked = self.max_error.unwrap_or_else(|| suiting(relief, ground.step));
+        if let (Some(Some(base)), Some(range), true) = (base, range, whole.is_some())
+            && base >= f64::from(range.low)
+        {
+            return Err(ground.failure(too_high(base, f64::from(range.low))));
         }
-        if let Some(level) = shoreline.filter(|&level| !range.contains(level as f32)) {
-            talk.warn(format!("{}: no ground at {level} m, so there is no line to keep", ground.name));
-        }
-
-        let mesh = self.triangles(&ground, asked)?;
-        let measured = measure(raster, &mesh);
-        if measured.max_error > asked || measured.missed + measured.void_covered > 0 {
-            let problem = format!("expected a mesh within {asked} m, got {measured:?}; please report it with the file");
-            return Err(failure(&problem));
-        }
+        let meshed = match (&whole, tile) {
+            (Some(raster), _) => self.in_one_piece(&ground, raster, asked, shoreline)?,
+            (None, side) => self.in_tiles(&mut ground, side.unwrap_or(TILE), asked, shoreline, talk)?,
+        };
+        drop(whole);
+        let base = base.map(|height| height.unwrap_or_else(|| self.below(&ground, meshed.pieces.lowest())));
         let coordinates = self.coordinates(&ground, talk);
         let place = ground.place(coordinates);
         let to = |at: DVec2| place.transform_point2(at);
@@ -192,12 +236,18 @@ impl Mesh {
             _ => place.matrix2.x_axis.to_angle(),
         };
         let form = Form { shoreline, base, exaggeration: self.exaggeration, place: &to, turn };
-        let mut model = Model::new(&mesh, raster, &form).map_err(|error| failure(&error.to_string()))?;
-        drop(mesh);
+        let made = meshed.pieces.finish(&form);
+        let mut model = made.map_err(|error| match error {
+            ModelError::Base { base, lowest } => ground.failure(too_high(base, lowest)),
+            error => ground.failure(error),
+        })?;
         if coordinates == Coordinates::LonLat {
-            ground.frame.to_lonlat(&mut model.positions).map_err(|problem| failure(&problem))?;
+            ground.frame.to_lonlat(&mut model.positions).map_err(|problem| ground.failure(problem))?;
         }
-        let notes = self.notes(&ground, coordinates, measured.max_error, base, shoreline);
+        if let (Some(level), true) = (shoreline, model.shoreline.is_empty()) {
+            talk.warn(format!("{}: the ground nowhere crosses {level} m, so there is no line to keep", ground.name));
+        }
+        let notes = self.notes(&ground, coordinates, meshed.max_error, base, shoreline);
         let origin = write::mesh(&self.out, format, &model, &notes)?;
 
         let answer = Answer {
@@ -206,11 +256,11 @@ impl Mesh {
             method: format!("{:?}", self.method).to_lowercase(),
             triangles: model.triangles.len(),
             vertices: model.positions.len(),
-            max_error: measured.max_error,
+            max_error: meshed.max_error,
             max_error_asked: asked,
             seconds: started.elapsed().as_secs_f64(),
-            samples: raster.heights().len(),
-            void: raster.voids().count(),
+            samples,
+            void: meshed.void,
             coordinates: coordinates.name(),
             crs: ground.frame.system().name().to_owned(),
             origin: origin.to_array(),
@@ -223,51 +273,69 @@ impl Mesh {
         if talk.json() { talk.print_json(answer) } else { talk.print(told(&answer, &ground)) }
     }
 
-    /// The land of the files, or of none the built-in coast.
+    /// The ground of the files, or of none the built-in coast.
     fn ground(&self, talk: &mut Talk) -> Result<Ground, Failure> {
         if self.files.is_empty() {
             if self.window.is_some() || self.lonlat {
                 let problem = "expected a file for --window and --lonlat, got none; name one";
                 return Err(Failure::Usage(problem.into()));
             }
+            let land = coast::coast();
+            let raster = land.raster().clone();
+            let place = DAffine2::from_scale_angle_translation(raster.spacing(), 0.0, land.origin());
             return Ok(Ground {
                 name: "the built-in coast".into(),
-                land: coast::coast(),
                 frame: Frame::metres(),
                 datum: "heights above its sea level".into(),
                 step: 0.0,
-                built_in: true,
+                spacing: raster.spacing(),
+                size: [raster.columns(), raster.rows()],
+                local_from_lattice: place,
+                crs_from_lattice: place,
+                samples: Samples::Coast(raster),
             });
         }
-        let name = name_of_all(&self.files).display().to_string();
-        let mut opened = Opened::open_all(&self.files, self.reading, talk)?;
-        let (land, frame) = match self.window {
-            None => opened.fitting(if self.full { usize::MAX } else { FITTING }, talk)?,
+        let opened = Opened::open_all(&self.files, self.reading, talk)?;
+        let (columns, rows) = (opened.info().columns, opened.info().rows);
+        let window = match self.window {
+            None => Window { column: 0, row: 0, columns, rows },
             Some(corners) => {
                 let system = System::of(self.lonlat);
-                let corners = [corners.truncate().truncate(), DVec2::new(corners.z, corners.w)];
+                let corners = [DVec2::new(corners.x, corners.y), DVec2::new(corners.z, corners.w)];
                 let [a, b] = corners.map(|at| opened.local(system, at));
                 let Some(window) = opened.samples_between(a?, b?) else {
                     let outside = opened.outside(system, 0.5 * (corners[0] + corners[1]));
                     return Err(opened.failure(&format!("--window holds less than 2 x 2 samples: {outside}")));
                 };
-                (opened.part(window, talk)?, opened.frame.clone())
+                window
             }
         };
-        if opened.info().columns * opened.info().rows > land.raster().heights().len() && self.window.is_none() {
-            talk.warn(format!(
-                "{name}: the error is that to the coarser samples; --full takes all, --window X,Y,X,Y all of a part"
-            ));
+        if window.columns < 2 || window.rows < 2 {
+            return Err(opened.failure(&format!("expected at least 2 x 2 samples, got {columns} x {rows}")));
         }
-        Ok(Ground { name, land, frame, datum: opened.datum(), step: opened.info().step, built_in: false })
+        let (frame, spacing) = (opened.frame.clone(), opened.frame.spacing());
+        Ok(Ground {
+            name: name_of_all(&self.files).display().to_string(),
+            datum: opened.datum(),
+            step: opened.info().step,
+            spacing,
+            size: [window.columns, window.rows],
+            local_from_lattice: DAffine2::from_scale_angle_translation(spacing, 0.0, frame.corner(window)),
+            crs_from_lattice: frame.crs_from_lattice(window),
+            frame,
+            samples: Samples::File(Box::new(opened), window),
+        })
     }
 
-    fn triangles(&self, ground: &Ground, asked: f64) -> Result<Triangulation, Failure> {
-        let raster = ground.land.raster();
-        // Heights are single precision; the bound must not grow by being so.
-        let single = asked as f32;
-        let single = if f64::from(single) > asked { single.next_down() } else { single };
+    fn in_one_piece(
+        &self,
+        ground: &Ground,
+        raster: &Raster,
+        asked: f64,
+        shoreline: Option<f64>,
+    ) -> Result<Meshed, Failure> {
         let bar = progress(1000, "meshing");
+        let single = not_above(asked);
         let made = match self.method {
             Method::Rtin => {
                 let mut mesh = Triangulation::default();
@@ -279,14 +347,71 @@ impl Mesh {
             }),
         };
         bar.finish_and_clear();
-        made.map_err(|error| Failure::Work(format!("{}: {error}", ground.name)))
+        let mesh = made.map_err(|error| ground.failure(error))?;
+        let mut pieces = Pieces::new(shoreline);
+        let max_error = kept(raster, &mesh, asked).map_err(|problem| ground.failure(problem))?;
+        pieces.add(&mesh, ground.whole(), raster, [0, 0]).map_err(|error| ground.failure(error))?;
+        Ok(Meshed { pieces, max_error, void: raster.voids().count() })
     }
 
-    /// The height of a base that nobody chose: below the ground by a fiftieth of the longer side as it will look.
-    fn below(&self, land: &Land) -> f64 {
-        let thickness = 0.02 * land.extent().max_element() / self.exaggeration;
+    fn in_tiles(
+        &self,
+        ground: &mut Ground,
+        side: usize,
+        asked: f64,
+        shoreline: Option<f64>,
+        talk: &mut Talk,
+    ) -> Result<Meshed, Failure> {
+        let (tiling, whole, name) = (Tiling { size: ground.size, side }, ground.whole(), ground.name.clone());
+        let failure = |problem: &dyn std::fmt::Display| Failure::Work(format!("{name}: {problem}"));
+        let bar = progress(tiling.tiles().iter().product::<usize>() as u64, "meshing");
+        let method = match self.method {
+            Method::Rtin => tiled::Method::Rtin,
+            Method::Tin => tiled::Method::Tin,
+        };
+        let mut meshed = Meshed { pieces: Pieces::new(shoreline), max_error: 0.0, void: 0 };
+        // What was read last: most tiles are written with the samples that they were made from.
+        let source = RefCell::new((ground, talk, None::<(Window, Raster)>));
+        let read = |window: Window| -> Result<Raster, Failure> {
+            let (ground, talk, last) = &mut *source.borrow_mut();
+            let raster = ground.read(Some(window), talk)?;
+            *last = Some((window, raster.clone()));
+            Ok(raster)
+        };
+        let done = tiling.mesh(
+            method,
+            not_above(asked),
+            &mut |window| read(window).map_err(Stopped::Told),
+            &mut |tile, raster, mesh| {
+                let told = |problem: &dyn std::fmt::Display| Stopped::Told(failure(problem));
+                let error = kept(raster, mesh, asked).map_err(|problem| told(&problem))?;
+                meshed.max_error = meshed.max_error.max(error);
+                meshed.void += own_voids(tile, raster);
+                let around = with_margin(tile, whole);
+                let last = source.borrow_mut().2.take().filter(|(window, _)| *window == around);
+                let samples = match last {
+                    Some((_, samples)) => samples,
+                    None => read(around).map_err(Stopped::Told)?,
+                };
+                bar.inc(1);
+                meshed.pieces.add(mesh, tile, &samples, [around.column, around.row]).map_err(|error| told(&error))
+            },
+        );
+        bar.finish_and_clear();
+        done.map_err(|stopped| match stopped {
+            Stopped::Mesh(error) => failure(&error),
+            Stopped::Told(failure) => failure,
+        })?;
+        Ok(meshed)
+    }
+
+    /// The height of a base that nobody chose: below the lowest ground by a fiftieth of the longer side as it will look.
+    fn below(&self, ground: &Ground, lowest: f64) -> f64 {
+        let [columns, rows] = ground.size;
+        let extent = DVec2::new(columns as f64 - 1.0, rows as f64 - 1.0) * ground.spacing;
+        let thickness = 0.02 * extent.max_element() / self.exaggeration;
         let step = 10f64.powf(thickness.log10().floor());
-        ((f64::from(land.height_range().low) - thickness) / step).floor() * step
+        ((lowest - thickness) / step).floor() * step
     }
 
     /// What X and Y are to be.
@@ -295,10 +420,14 @@ impl Mesh {
         if self.lonlat {
             return Coordinates::LonLat;
         }
-        if self.local || ground.built_in || !ground.frame.is_placed() || matches!(system, Crs::Geographic { .. }) {
+        if self.local
+            || matches!(ground.samples, Samples::Coast(_))
+            || !ground.frame.is_placed()
+            || matches!(system, Crs::Geographic { .. })
+        {
             return Coordinates::Local;
         }
-        let scale = ground.place(Coordinates::File).matrix2.x_axis.length() / ground.land.raster().spacing().x;
+        let scale = ground.crs_from_lattice.matrix2.x_axis.length() / ground.spacing.x;
         if (scale - 1.0).abs() > 0.01 {
             let scale = tidy(scale, 3);
             talk.warn(format!(
@@ -344,13 +473,49 @@ impl Coordinates {
 }
 
 impl Ground {
+    /// All of it.
+    fn whole(&self) -> Window {
+        let [columns, rows] = self.size;
+        Window { column: 0, row: 0, columns, rows }
+    }
+
+    /// The samples of a part, or of all.
+    fn read(&mut self, part: Option<Window>, talk: &mut Talk) -> Result<Raster, Failure> {
+        let part = part.unwrap_or(self.whole());
+        match &mut self.samples {
+            Samples::File(opened, window) => opened.samples(self.frame.within(*window, part), talk),
+            Samples::Coast(raster) => {
+                let sample = |column, row| raster.sample(column, row).unwrap_or(f32::NAN);
+                let row = |row| (part.column..part.column + part.columns).map(move |column| sample(column, row));
+                let heights = (part.row..part.row + part.rows).flat_map(row).collect();
+                let raster = Raster::new(part.columns, part.rows, self.spacing, heights);
+                raster.map_err(|error| Failure::Work(error.to_string()))
+            }
+        }
+    }
+
+    /// The lowest and the highest of all heights of the file.
+    fn survey(&mut self, talk: &mut Talk) -> Result<HeightRange, Failure> {
+        match &mut self.samples {
+            Samples::Coast(raster) => Ok(raster.range()),
+            Samples::File(opened, _) => {
+                let survey = opened.survey(talk)?;
+                let none = HeightRange::EMPTY;
+                Ok(HeightRange { low: survey.min.unwrap_or(none.low), high: survey.max.unwrap_or(none.high) })
+            }
+        }
+    }
+
+    /// A failure with its name.
+    fn failure(&self, problem: impl std::fmt::Display) -> Failure {
+        Failure::Work(format!("{}: {problem}", self.name))
+    }
+
     /// From column and row to X and Y; for longitude and latitude to what they are computed from.
     fn place(&self, coordinates: Coordinates) -> DAffine2 {
         match coordinates {
-            Coordinates::Local => {
-                DAffine2::from_scale_angle_translation(self.land.raster().spacing(), 0.0, self.land.origin())
-            }
-            Coordinates::File | Coordinates::LonLat => self.frame.crs_from_lattice(&self.land),
+            Coordinates::Local => self.local_from_lattice,
+            Coordinates::File | Coordinates::LonLat => self.crs_from_lattice,
         }
     }
 
@@ -360,7 +525,7 @@ impl Ground {
         match coordinates {
             Coordinates::File => format!("{}, X and Y in {}", system.name(), system.unit()),
             Coordinates::LonLat => "longitude and latitude in degrees".into(),
-            Coordinates::Local if self.built_in => "metres east and north".into(),
+            Coordinates::Local if matches!(self.samples, Samples::Coast(_)) => "metres east and north".into(),
             Coordinates::Local => {
                 let middle = self.frame.crs(DVec2::ZERO);
                 let shown = |x| self.frame.shown(x);
@@ -368,6 +533,46 @@ impl Ground {
             }
         }
     }
+}
+
+/// How far a mesh is from its samples (m), measured at each; an error if this is farther than was asked for.
+fn kept(raster: &Raster, mesh: &Triangulation, asked: f64) -> Result<f64, String> {
+    let measured = measure(raster, mesh);
+    match measured.max_error <= asked && measured.missed + measured.void_covered == 0 {
+        true => Ok(measured.max_error),
+        false => Err(format!("expected a mesh within {asked} m, got {measured:?}; please report it with the file")),
+    }
+}
+
+/// A bound in single precision that is not above it.
+fn not_above(asked: f64) -> f32 {
+    let single = asked as f32;
+    if f64::from(single) > asked { single.next_down() } else { single }
+}
+
+fn too_high(base: f64, lowest: f64) -> String {
+    format!("expected --base below the lowest ground, {} m, got {base} m; choose a lower one", tidy(lowest, 3))
+}
+
+/// A window with a sample more on each side, as far as there is one.
+fn with_margin(tile: Window, whole: Window) -> Window {
+    let (column, row) = (tile.column.saturating_sub(1), tile.row.saturating_sub(1));
+    Window {
+        column,
+        row,
+        columns: (tile.column + tile.columns + 1).min(whole.columns) - column,
+        rows: (tile.row + tile.rows + 1).min(whole.rows) - row,
+    }
+}
+
+/// Voids of a tile but for those in its first column and row, which are the neighbours'.
+fn own_voids(tile: Window, raster: &Raster) -> usize {
+    let from = |first: usize| usize::from(first > 0);
+    let in_row = |row: usize| {
+        let own = (from(tile.column)..raster.columns()).map(|column| row * raster.columns() + column);
+        own.filter(|&index| raster.voids().is_void(index)).count()
+    };
+    if raster.voids().any() { (from(tile.row)..raster.rows()).map(in_row).sum() } else { 0 }
 }
 
 /// A height that need not be given. A parser takes the file that follows the option for it.

@@ -135,6 +135,51 @@ fn the_bound_holds_at_every_sample_in_the_files_own_coordinates() {
 }
 
 #[test]
+fn tiles_join_without_a_gap() {
+    let desk = Desk::new();
+    let (whole, tiled) = (desk.path("whole.obj"), desk.path("tiled.obj"));
+    for method in ["rtin", "tin"] {
+        for tile in ["8", "16", "64"] {
+            let order =
+                ["mesh", &desk.land, "--method", method, "--max-error", "1.5", "--shoreline", "3", "--base", "-90"];
+            let one = json(&[&order[..], &["--out", &whole]].concat());
+            let many = json(&[&order[..], &["--tile", tile, "--out", &tiled]].concat());
+            let (vertices, triangles) = obj(&tiled);
+            let mut edges = HashMap::new();
+            for [a, b, c] in &triangles {
+                for edge in [(*a, *b), (*b, *c), (*c, *a)] {
+                    *edges.entry(edge).or_insert(0) += 1;
+                }
+            }
+            let closed = edges.iter().all(|(&(from, to), &count)| count == 1 && edges.contains_key(&(to, from)));
+            assert!(closed, "{method} {tile}");
+            let ground: Vec<_> =
+                triangles.into_iter().filter(|t| t.iter().all(|&vertex| vertices[vertex][2] > -90.0)).collect();
+            let (worst, missed) = measured(&vertices, &ground);
+            assert!(worst <= 1.5 + 1e-9 && missed == 0, "{method} {tile}: {worst}, {missed} missed");
+            assert!((many["max_error"].as_f64().expect("a number") - worst).abs() < 1e-5);
+            assert_eq!((&many["void"], &many["samples"]), (&one["void"], &one["samples"]));
+            assert_eq!(many["base"], -90.0);
+            // A normal is that of the ground, at a tile's border too.
+            let normals = |file: &str| -> HashMap<String, String> {
+                let text = std::fs::read_to_string(file).expect("a mesh");
+                let lines = |start: &str| -> Vec<String> {
+                    text.lines().filter_map(|line| line.strip_prefix(start)).map(str::to_owned).collect()
+                };
+                lines("v ").into_iter().zip(lines("vn ")).collect()
+            };
+            let (expected, got) = (normals(&whole), normals(&tiled));
+            let common: Vec<_> = got.iter().filter(|(place, _)| expected.contains_key(*place)).collect();
+            assert!(common.len() > 100);
+            // Parted vertices' names differ, and so may what was parted there.
+            let other = common.iter().filter(|(place, normal)| expected[*place] != **normal).count();
+            assert_eq!(other, 0, "{method} {tile}");
+        }
+    }
+    fails(&["mesh", &desk.land, "--tile", "100", "--out", &whole], 2, "expected a power of two");
+}
+
+#[test]
 fn a_base_makes_a_closed_body_for_printing() {
     let desk = Desk::new();
     let out = desk.path("print.stl");
@@ -198,7 +243,7 @@ fn a_waterline_is_kept_as_edges() {
     }
     let dry = json(&["mesh", &desk.land, "--shoreline", "4000", "--out", &out]);
     assert_eq!(dry["shoreline_edges"], 0);
-    assert!(dry["warnings"][0].as_str().is_some_and(|w| w.contains("no ground at 4000 m")), "{dry}");
+    assert!(dry["warnings"][0].as_str().is_some_and(|w| w.contains("nowhere crosses 4000 m")), "{dry}");
 }
 
 #[test]
@@ -302,7 +347,8 @@ fn files_that_join_become_one_mesh() {
             size: [20, 20],
             y_south: false,
         };
-        let heights: Vec<f32> = (0..400).map(|i| ((first + i % 20) as f32 * 0.4).sin() * 9.0 + (i / 20) as f32).collect();
+        let heights: Vec<f32> =
+            (0..400).map(|i| ((first + i % 20) as f32 * 0.4).sin() * 9.0 + (i / 20) as f32).collect();
         geotiff(&file, &georeference, None, GridSamples::F32(&heights), None, "").expect("written");
         file.display().to_string()
     };

@@ -6,10 +6,12 @@
 mod base;
 mod edges;
 mod model;
+mod pieces;
 mod shoreline;
 
 use edges::Edges;
 pub use model::{Form, Model, ModelError};
+pub use pieces::Pieces;
 
 pub mod measure;
 pub mod rtin;

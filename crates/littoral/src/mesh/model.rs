@@ -5,12 +5,9 @@
 //! heights are stretched; and columns and rows become the coordinates that are wanted ([`Form::place`]), last of all, so that
 //! everything before is decided on the lattice of the samples.
 
-use super::base::close;
-use super::shoreline::cut;
-use super::{Edges, Triangulation};
-use crate::field::Raster;
+use super::{Edges, Pieces, Triangulation};
+use crate::field::{Raster, Window};
 use glam::{DVec2, DVec3, Vec3};
-use rayon::prelude::*;
 
 /// Triangles in space.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,7 +60,7 @@ pub enum ModelError {
 }
 
 impl Model {
-    /// A triangulation of a raster, given places.
+    /// A triangulation of a raster, given places. [`Pieces`] does the same for tiles of a larger one.
     ///
     /// With a base the model is closed: each edge lies between two triangles that run through it in opposite directions.
     /// Where voids touch in a single sample, that sample is pulled apart by a hundredth of a cell, so that this is
@@ -72,37 +69,10 @@ impl Model {
     /// # Errors
     /// If the base is not below the ground, or there is too much of it, or none.
     pub fn new(triangulation: &Triangulation, raster: &Raster, form: &Form) -> Result<Model, ModelError> {
-        if triangulation.triangles.is_empty() {
-            return Err(ModelError::Empty);
-        }
-        let mut model = Model {
-            positions: lattice_positions(triangulation, raster),
-            triangles: triangulation.triangles.clone(),
-            ..Model::default()
-        };
-        if let Some(level) = form.shoreline {
-            model.shoreline = cut(&mut model.positions, &mut model.triangles, raster.spacing(), level);
-        }
-        model.ground_triangles = model.triangles.len();
-        model.normals = model
-            .positions
-            .par_iter()
-            .map(|at| {
-                let slope = slope_at(raster, at.truncate()) * form.exaggeration;
-                let normal = DVec3::new(-slope.x, -slope.y, 1.0).normalize();
-                DVec2::from_angle(form.turn).rotate(normal.truncate()).extend(normal.z).as_vec3()
-            })
-            .collect();
-        if let Some(base) = form.base {
-            close(&mut model, base)?;
-        }
-        if u32::try_from(model.positions.len().max(model.triangles.len())).is_err() {
-            return Err(ModelError::TooLarge);
-        }
-        model.positions.par_iter_mut().for_each(|position| {
-            *position = (form.place)(position.truncate()).extend(position.z * form.exaggeration);
-        });
-        Ok(model)
+        let window = Window { column: 0, row: 0, columns: raster.columns(), rows: raster.rows() };
+        let mut pieces = Pieces::new(form.shoreline);
+        pieces.add(triangulation, window, raster, [0, 0])?;
+        pieces.finish(form)
     }
 
     /// Whether each edge lies between exactly two triangles that run through it in opposite directions.
@@ -128,57 +98,4 @@ impl Model {
         let (low, high) = (DVec3::splat(f64::INFINITY), DVec3::splat(f64::NEG_INFINITY));
         self.positions.iter().fold((low, high), |(low, high), at| (low.min(*at), high.max(*at)))
     }
-}
-
-/// Column, row and height (m) of each vertex.
-fn lattice_positions(triangulation: &Triangulation, raster: &Raster) -> Vec<DVec3> {
-    let (columns, heights) = (raster.columns(), raster.heights());
-    let place = |&[column, row]: &[u32; 2]| {
-        let height = heights[row as usize * columns + column as usize];
-        DVec3::new(f64::from(column), f64::from(row), f64::from(height))
-    };
-    triangulation.vertices.par_iter().map(place).collect()
-}
-
-/// The slope (m/m, eastward and northward) at a sample: the mean of those towards the neighbours that are known.
-fn slope_of(raster: &Raster, column: usize, row: usize) -> DVec2 {
-    let Some(here) = raster.sample(column, row).map(f64::from) else { return DVec2::ZERO };
-    let (mut sum, mut count) = (DVec2::ZERO, DVec2::ZERO);
-    let mut towards = |along: DVec2, neighbour: Option<f32>| {
-        if let Some(there) = neighbour {
-            sum += along * (f64::from(there) - here);
-            count += along.abs();
-        }
-    };
-    if column > 0 {
-        towards(-DVec2::X, raster.sample(column - 1, row));
-    }
-    if column + 1 < raster.columns() {
-        towards(DVec2::X, raster.sample(column + 1, row));
-    }
-    if row > 0 {
-        towards(-DVec2::Y, raster.sample(column, row - 1));
-    }
-    if row + 1 < raster.rows() {
-        towards(DVec2::Y, raster.sample(column, row + 1));
-    }
-    sum / count.max(DVec2::ONE) / raster.spacing()
-}
-
-/// The same between samples, blended from the known ones round the place (in columns and rows).
-fn slope_at(raster: &Raster, at: DVec2) -> DVec2 {
-    let last = DVec2::new(raster.columns() as f64 - 1.0, raster.rows() as f64 - 1.0);
-    let at = at.clamp(DVec2::ZERO, last);
-    let (base, part) = (at.floor(), at - at.floor());
-    let (mut sum, mut known) = (DVec2::ZERO, 0.0);
-    for (i, j) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-        let share = |far: usize, part: f64| if far == 1 { part } else { 1.0 - part };
-        let weight = share(i, part.x) * share(j, part.y);
-        let (column, row) = (base.x as usize + i, base.y as usize + j);
-        if weight > 0.0 && raster.sample(column, row).is_some() {
-            sum += weight * slope_of(raster, column, row);
-            known += weight;
-        }
-    }
-    if known > 0.0 { sum / known } else { DVec2::ZERO }
 }

@@ -8,15 +8,23 @@ use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 use std::collections::HashMap;
 
-/// Parts triangles where they cross `level`; positions are columns, rows and heights, `spacing` (m) apart. Answers with
-/// the edges of the line, higher ground on their left, one after the other along it.
-pub(super) fn cut(
-    positions: &mut Vec<DVec3>,
-    triangles: &mut Vec<[u32; 3]>,
-    spacing: DVec2,
-    level: f64,
-) -> Vec<[u32; 2]> {
-    let mut side: Vec<Ordering> = positions.iter().map(|at| at.z.total_cmp(&level)).collect();
+/// Nearer to the level than this (m) is at it: a cut so close to a vertex would be hard to tell from it.
+const AT_LEVEL: f64 = 1e-6;
+
+fn side_of(height: f64, level: f64) -> Ordering {
+    let above = height - level;
+    if above > AT_LEVEL {
+        Ordering::Greater
+    } else if above < -AT_LEVEL {
+        Ordering::Less
+    } else {
+        Ordering::Equal
+    }
+}
+
+/// Parts triangles where they cross `level`; positions are columns, rows and heights, `spacing` (m) apart.
+pub(super) fn cut(positions: &mut Vec<DVec3>, triangles: &mut Vec<[u32; 3]>, spacing: DVec2, level: f64) {
+    let mut side: Vec<Ordering> = positions.iter().map(|at| side_of(at.z, level)).collect();
     let mut cuts = HashMap::new();
     let mut parted = Vec::with_capacity(triangles.len());
     for &triangle in triangles.iter() {
@@ -35,9 +43,14 @@ pub(super) fn cut(
         let mut between = |from: u32, to: u32| {
             let (low, high) = (from.min(to), from.max(to));
             *cuts.entry((low, high)).or_insert_with(|| {
-                let (p, q) = (positions[low as usize], positions[high as usize]);
+                let (mut p, mut q) = (positions[low as usize], positions[high as usize]);
+                // From the south-western end on, so that tiles agree on their common border to the bit.
+                if (q.y, q.x) < (p.y, p.x) {
+                    (p, q) = (q, p);
+                }
                 let part = (level - p.z) / (q.z - p.z);
-                positions.push(p.truncate().lerp(q.truncate(), part).extend(level));
+                let at = p.truncate() + (q - p).truncate() * part;
+                positions.push(at.extend(level));
                 side.push(Ordering::Equal);
                 positions.len() as u32 - 1
             })
@@ -61,16 +74,17 @@ pub(super) fn cut(
         }
     }
     *triangles = parted;
-    line(triangles, &side)
 }
 
-/// The edges at the level between a triangle above it and one that is not.
-fn line(triangles: &[[u32; 3]], side: &[Ordering]) -> Vec<[u32; 2]> {
+/// The edges at the level between a triangle above it and one that is not, the higher one on their left, one after the
+/// other along the line.
+pub(super) fn line(positions: &[DVec3], triangles: &[[u32; 3]], level: f64) -> Vec<[u32; 2]> {
+    let side = |vertex: u32| side_of(positions[vertex as usize].z, level);
     let (mut above, mut other) = (Vec::new(), Vec::new());
     for &[a, b, c] in triangles {
-        let high = [a, b, c].iter().any(|&vertex| side[vertex as usize] == Ordering::Greater);
+        let high = [a, b, c].iter().any(|&vertex| side(vertex) == Ordering::Greater);
         for (from, to) in [(a, b), (b, c), (c, a)] {
-            if [from, to].iter().all(|&vertex| side[vertex as usize] == Ordering::Equal) {
+            if [from, to].iter().all(|&vertex| side(vertex) == Ordering::Equal) {
                 if high { above.push([from, to]) } else { other.push([to, from]) }
             }
         }
