@@ -191,10 +191,10 @@ impl Ground<'_> {
         }
     }
 
-    /// The greatest error of a large triangle, from smaller ones where it is whole.
-    fn large(&self, rtin: &Rtin, stack: &mut Stack, corners: Corners, state: u8) -> f32 {
+    /// The greatest error of a large triangle, from smaller ones where it is whole; `floor` if it is not more.
+    fn large(&self, rtin: &Rtin, stack: &mut Stack, corners: Corners, state: u8, floor: f32) -> f32 {
         if state != SOLID || corners.iter().any(|at| at[0] > self.last[0] || at[1] > self.last[1]) {
-            return self.any(corners, state);
+            return self.any(corners, state).max(floor);
         }
         // The right angle is at the corner that the others are equally far from.
         let [a, b, c] = corners;
@@ -208,14 +208,14 @@ impl Ground<'_> {
             _ => [c, a, b],
         };
         let heights = self.raster.heights();
-        let error = search::deviation(rtin, heights, turned, stack);
+        let error = search::deviation(rtin, heights, turned, f64::from(floor), stack);
         // Halving heights time and again may round them, unless they have few digits.
         let highest = corners
             .map(|at| f64::from(heights[at[1] as usize * self.raster.columns() + at[0] as usize]).abs())
             .into_iter()
             .fold(0.0, f64::max);
         let rounding = if self.exactness.bits <= 24 { 0.0 } else { 64.0 * f64::EPSILON * highest };
-        up(if error > 0.0 { error + rounding } else { error })
+        if error > f64::from(floor) { up(error + rounding) } else { floor }
     }
 
     /// Measures all small squares of a strip.
@@ -307,48 +307,70 @@ pub(super) fn measure(rtin: &mut Rtin, raster: &Raster) {
             if y <= level.rows {
                 let line = &mut rtin.deviations[level.flat(0, y)..][..level.columns];
                 line.iter_mut().zip(seam).for_each(|(side, found)| raise(side, found));
-                nest(rtin, k, y - 1..level.rows.min(y + 1));
+                nest_sides(rtin, k, y - 1..level.rows.min(y + 1));
+                nest_centres(rtin, k, y - 1..level.rows.min(y + 1));
             }
         }
     }
     for k in small..levels.len() {
         let level = levels[k];
+        nest_sides(rtin, k, 0..level.rows);
+        // What is no more than is known of what lies within does not matter.
         let known = &*rtin;
-        let work = |stack: &mut Stack, index: usize| {
+        let quarters = |stack: &mut Stack, index: usize| {
             let (x, y) = (index % level.columns, index / level.columns);
-            ground.square(k, x, y, &mut |corners, state| ground.large(known, stack, corners, state))
+            let (side, states) = (2u32 << k, ground.states(k, x, y));
+            let places = [level.flat(x, y), level.upright(x + 1, y), level.flat(x, y + 1), level.upright(x, y)];
+            let parts = [Part::South, Part::East, Part::North, Part::West];
+            std::array::from_fn(|i| {
+                let corners = quarter(x as u32 * side, y as u32 * side, side, parts[i]);
+                let floor = known.deviations[places[i]];
+                (places[i], ground.large(known, stack, corners, state(states, parts[i]), floor))
+            })
         };
-        let squares: Vec<Errors> =
-            (0..level.columns * level.rows).into_par_iter().map_init(Stack::default, work).collect();
-        for (index, [centre, south, east, north, west]) in squares.into_iter().enumerate() {
+        let squares = level.columns * level.rows;
+        let found: Vec<[(usize, f32); 4]> = (0..squares).into_par_iter().map_init(Stack::default, quarters).collect();
+        found.into_iter().flatten().for_each(|(place, found)| raise(&mut rtin.deviations[place], found));
+        nest_centres(rtin, k, 0..level.rows);
+        let known = &*rtin;
+        let centres = |stack: &mut Stack, index: usize| {
             let (x, y) = (index % level.columns, index / level.columns);
-            let deviations = &mut rtin.deviations;
-            raise(&mut deviations[level.centre(x, y)], centre);
-            raise(&mut deviations[level.flat(x, y)], south);
-            raise(&mut deviations[level.flat(x, y + 1)], north);
-            raise(&mut deviations[level.upright(x, y)], west);
-            raise(&mut deviations[level.upright(x + 1, y)], east);
-        }
-        nest(rtin, k, 0..level.rows);
+            let side = 2u32 << k;
+            let [a, b] = halves(x as u32 * side, y as u32 * side, side, rises(x, y));
+            let [state_a, state_b] = half_states(ground.states(k, x, y), rises(x, y));
+            let first = ground.large(known, stack, a, state_a, known.deviations[level.centre(x, y)]);
+            ground.large(known, stack, b, state_b, first)
+        };
+        let found: Vec<f32> = (0..squares).into_par_iter().map_init(Stack::default, centres).collect();
+        rtin.deviations[level.centres..][..squares].copy_from_slice(&found);
     }
 }
 
-/// Raises what belongs to some rows of squares to its children.
-fn nest(rtin: &mut Rtin, k: usize, rows: std::ops::Range<usize>) {
-    let level = rtin.levels[k];
-    // Finer sizes lie before coarser ones, and centres before sides.
+/// Raises the sides of some rows of squares to the centres of the finer squares that they are a part of.
+fn nest_sides(rtin: &mut Rtin, k: usize, rows: std::ops::Range<usize>) {
+    if k == 0 {
+        return;
+    }
+    let (level, finer) = (rtin.levels[k], rtin.levels[k - 1]);
+    // Finer sizes lie before coarser ones.
     let (before, here) = rtin.deviations.split_at_mut(level.centres);
-    let (centres, sides) = here.split_at_mut(level.flat - level.centres);
-    let (flat, upright) = sides.split_at_mut(level.upright - level.flat);
+    let (flat, upright) = here[level.flat - level.centres..].split_at_mut(level.upright - level.flat);
     let columns = level.columns;
-    for y in rows.clone().filter(|_| k > 0) {
-        let finer = rtin.levels[k - 1];
+    for y in rows {
         for j in 0..2.min(finer.rows - 2 * y) {
             let centres = &before[finer.centre(0, 2 * y + j)..][..finer.columns];
             raise_flat(&mut flat[(y + j) * columns..][..columns], centres);
             raise_upright(&mut upright[y * (columns + 1)..][..columns + 1], centres);
         }
     }
+}
+
+/// Raises the centres of some rows of squares to their sides.
+fn nest_centres(rtin: &mut Rtin, k: usize, rows: std::ops::Range<usize>) {
+    let level = rtin.levels[k];
+    let (centres, sides) = rtin.deviations[level.centres..].split_at_mut(level.flat - level.centres);
+    let (flat, upright) = sides.split_at(level.upright - level.flat);
+    let columns = level.columns;
     for y in rows {
         let (south, north) = (&flat[y * columns..][..columns], &flat[(y + 1) * columns..][..columns]);
         let upright = &upright[y * (columns + 1)..][..columns + 1];
@@ -411,4 +433,84 @@ fn coarser_states(finer: &[States], under: Level, level: Level) -> Vec<States> {
         (a[0] | b[0]) | (b[1] | d[0]) << 2 | (c[1] | d[1]) << 4 | (a[1] | c[0]) << 6
     };
     (0..level.columns * level.rows).into_par_iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec2;
+
+    fn rough(columns: usize, rows: usize, kind: u32) -> Raster {
+        let mut state = 0x9e37_79b9_7f4a_7c15_u64 ^ u64::from(kind);
+        let mut random = move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 40) as f32 / 16_777_216.0
+        };
+        let height = |i: usize| {
+            let (x, y) = ((i % columns) as f32, (i / columns) as f32);
+            let waves = 400.0 * (x * 0.021).sin() * (y * 0.017).cos() + 50.0 * (x * 0.11 + y * 0.07).sin();
+            match kind {
+                // Whole numbers are exact, others not; a block and a few samples may be void.
+                0 => (waves + 8.0 * random()).floor(),
+                1 => waves + 3.0 * random() + 1000.0,
+                _ if random() < 1e-4 || (x as usize / 40 == 2 && y as usize / 40 == 3) => f32::NAN,
+                _ => waves + 3.0 * random(),
+            }
+        };
+        Raster::new(columns, rows, DVec2::ONE, (0..columns * rows).map(height).collect()).expect("a raster")
+    }
+
+    /// Every deviation by its definition, triangle by triangle in double precision.
+    fn slowly(raster: &Raster) -> Rtin {
+        let size = [raster.columns(), raster.rows()];
+        let mut rtin = Rtin::layout(size, 2, Vec::new());
+        let levels = rtin.levels.clone();
+        let states = if raster.voids().any() { all_states(raster, &levels) } else { Vec::new() };
+        let last = size.map(|samples| samples as u32 - 1);
+        let ground = Ground { raster, exactness: Exactness::of(raster), levels: &levels, states, last };
+        for (k, level) in levels.iter().enumerate() {
+            for (x, y) in (0..level.rows).flat_map(|y| (0..level.columns).map(move |x| (x, y))) {
+                let found = ground.square(k, x, y, &mut |corners, state| ground.any(corners, state));
+                let places = [level.centre(x, y), level.flat(x, y), level.upright(x + 1, y), level.flat(x, y + 1)];
+                for (place, found) in places.into_iter().chain([level.upright(x, y)]).zip(found) {
+                    rtin.deviations[place] = rtin.deviations[place].max(found);
+                }
+            }
+            nest_sides(&mut rtin, k, 0..level.rows);
+            nest_centres(&mut rtin, k, 0..level.rows);
+        }
+        rtin
+    }
+
+    #[test]
+    fn quick_deviations_are_the_defined_ones() {
+        for (columns, rows, kind) in
+            [(257, 257, 0), (257, 257, 1), (200, 331, 0), (513, 130, 1), (300, 300, 2), (1200, 66, 1), (65, 65, 1)]
+        {
+            let raster = rough(columns, rows, kind);
+            let (quick, slow) = (Rtin::new(&raster), slowly(&raster));
+            assert_eq!(quick.deviations.len(), slow.deviations.len());
+            for (quick, slow) in quick.deviations.iter().zip(&slow.deviations) {
+                let rounding = if kind == 0 { 0.0 } else { 1e-3 };
+                assert!(
+                    quick >= slow && *quick <= slow + rounding || quick == slow,
+                    "{columns} × {rows}: {quick}, {slow}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn threads_find_the_same_bits() {
+        for kind in 0..3 {
+            let raster = rough(700, 500, kind);
+            let of = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                pool.install(|| Rtin::new(&raster).deviations.iter().map(|d| d.to_bits()).collect::<Vec<_>>())
+            };
+            assert!(of(1) == of(3), "{kind}");
+        }
+    }
 }
