@@ -96,6 +96,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     within(text, f64::MIN_POSITIVE, 1e12, "a number above 0")
 }
 
+/// A tolerance in pixels.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    within(text, 1e-3, 1e6, "0.001 to 1000000 pixels")
+}
+
 /// An instant in seconds.
 pub fn instant(text: &str) -> Result<f64, String> {
     within(text, -1e9, 1e9, "-1e9 to 1e9 seconds")

@@ -4,6 +4,7 @@
 //! the input or the work failed, 2 when the command line was wrong.
 
 mod bench;
+mod detail;
 mod film;
 mod ground;
 mod height;

@@ -11,14 +11,16 @@
 //! 2. [`field`]: what has a height — land from samples, noise.
 //! 3. [`raycast`]: what a ray meets first; lines of sight and viewsheds.
 //! 4. [`picture`]: pictures without a GPU.
-//! 5. [`mesh`]: meshes of a whole raster within a bound of error.
-//! 6. [`flight`]: paths through the air.
+//! 5. [`lod`]: triangles that follow the eye.
+//! 6. [`mesh`]: meshes of a whole raster within a bound of error.
+//! 7. [`flight`]: paths through the air.
 //!
 //! Conventions: right-handed coordinates, x east, y north, z up; metres, seconds and radians unless a name says
 //! otherwise; `f64` says where, `f32` says how far from the eye, integers say which.
 
 pub mod field;
 pub mod flight;
+pub mod lod;
 pub mod mesh;
 pub mod picture;
 pub mod raycast;

@@ -381,18 +381,11 @@ impl HeightField for Sea {
         Some(self.height_at(world.truncate()) as f32)
     }
 
-    fn range(&self, cell: Cell) -> HeightRange {
+    fn range(&self, _: Cell) -> HeightRange {
+        // The same everywhere: asking the water itself would cost more than a tighter answer saves.
         let level = self.level as f32;
-        // Room for the rounding of level + height.
-        let slack = 1e-6 * (level.abs() + self.bounds.height);
-        let all = self.bounds.height + slack;
-        let size = cell.side() * self.datum.metres_per_uv(cell.centre());
-        let climb = self.steepest() * (0.5 * size.length()) as f32 + slack + Sea::TOLERANCE * self.bounds.slope;
-        if climb >= all {
-            return HeightRange { low: level - all, high: level + all };
-        }
-        let middle = self.height(cell.centre()).unwrap_or(level);
-        HeightRange { low: (middle - climb).max(level - all), high: (middle + climb).min(level + all) }
+        let all = self.bounds.height + 1e-6 * (level.abs() + self.bounds.height);
+        HeightRange { low: level - all, high: level + all }
     }
 
     fn error(&self, cell: Cell) -> f32 {
@@ -407,6 +400,12 @@ impl HeightField for Sea {
             error = error.min(0.125 * curvature * diagonal * diagonal);
         }
         error + 2.0 * Sea::TOLERANCE * b.slope.min(1.0) + 4e-7 * (self.level.abs() as f32 + b.height)
+    }
+
+    fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {
+        // The same for all cells of a size.
+        let finer = depth.min(Cell::MAX_LEVEL - cell.level);
+        self.error(Cell { level: cell.level + finer, x: cell.x << finer, y: cell.y << finer, ..cell })
     }
 
     fn heights(&self, places: &[Place], heights: &mut [f32]) {
