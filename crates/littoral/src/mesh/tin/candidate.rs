@@ -183,8 +183,8 @@ fn small(ground: &Ground, spans: &Spans, west_of: impl Fn(u32, u32) -> f64, east
             let mut at = u32::MAX;
             row_errors(line, (last - first + 1) as usize, west_of(row, first), east, |errors, column| {
                 let mut hits = 0;
-                for lane in 0..LANES {
-                    hits |= u32::from(errors[lane] == found.error) << lane;
+                for (lane, error) in errors.iter().enumerate() {
+                    hits |= u32::from(*error == found.error) << lane;
                 }
                 if hits != 0 && at == u32::MAX {
                     at = first + column as u32 + hits.trailing_zeros();
