@@ -21,7 +21,9 @@ mod border;
 mod cut;
 mod grow;
 mod prepare;
+mod rows;
 mod search;
+mod states;
 
 use super::{MeshError, Triangulation, tolerance};
 use crate::field::Raster;

@@ -162,6 +162,10 @@ impl Growth<'_> {
             }
             std::mem::swap(&mut squares, &mut finer);
         }
+        // Each where it was, so that the next time it is large enough.
+        if top.is_multiple_of(2) {
+            std::mem::swap(&mut squares, &mut finer);
+        }
         (self.scratch.squares, self.scratch.finer, self.scratch.upper) = (squares, finer, upper);
         self.scratch.line = line;
         Ok(())
