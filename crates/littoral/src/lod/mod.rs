@@ -13,12 +13,14 @@
 
 mod drawing;
 mod metric;
+mod nested;
 mod patches;
 mod quadtree;
 mod whole;
 
 pub use drawing::{Drawing, Edge, Mesh, Patch, Stencil, Vertex};
 pub use metric::{Bounds, ScreenMetric, ViewError};
+pub use nested::{Nested, Seams};
 pub use patches::Patches;
 pub use quadtree::Quadtree;
 pub use whole::Whole;

@@ -12,7 +12,7 @@ use check::{Case, check};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::{Fbm, NoiseField};
 use littoral::field::{HeightField, Land, Raster, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Patches, Quadtree, ViewError, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Seams, ViewError, Whole};
 use littoral::space::{Datum, View};
 use littoral::waves::{SeaState, Superposition};
 
@@ -45,9 +45,18 @@ pub struct Method {
 /// Every method there is.
 pub const METHODS: &[Method] = &[
     Method { name: "whole", make: |limits| Box::new(Whole::new(limits)) },
+    Method { name: "nested", make: |limits| nested(limits, Seams::Strips) },
+    Method { name: "nested, morphing", make: |limits| nested(limits, Seams::Morphing) },
     Method { name: "quadtree", make: |limits| Box::new(Quadtree::new(limits)) },
     Method { name: "patches", make: |limits| Box::new(Patches::new(limits)) },
 ];
+
+/// Nested grids of few cells.
+fn nested(limits: Limits, seams: Seams) -> Box<dyn Lod> {
+    let mut lod = Nested::new(limits);
+    (lod.cells, lod.seams) = (8, seams);
+    Box::new(lod)
+}
 
 /// Ground, invented ground or sea, and the finest level worth drawing.
 pub struct Surface {
