@@ -3,10 +3,46 @@
 use glam::DVec2;
 use littoral::field::{Raster, Window};
 use littoral::mesh::measure::{Flaw, measure, verify, verify_delaunay};
-use littoral::mesh::rtin::Rtin;
+use littoral::mesh::rtin::{Rtin, Scratch};
 use littoral::mesh::tiled::{Method, Tiling};
 use littoral::mesh::{MeshError, Triangulation, tin};
 use proptest::prelude::*;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+/// The system's allocator, counting what each thread asks for.
+struct Counting;
+
+thread_local! {
+    static COUNT: Cell<usize> = const { Cell::new(0) };
+}
+
+fn allocations() -> usize {
+    COUNT.with(Cell::get)
+}
+
+// SAFETY: every call goes to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's promises are those of `System`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        unsafe { System.dealloc(at, layout) }
+    }
+
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: as above.
+        unsafe { System.realloc(at, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
 
 /// How many random cases a property is tried on.
 fn cases(few: u32) -> ProptestConfig {
@@ -258,6 +294,90 @@ proptest! {
         tiling.mesh(method, error, &mut read, &mut write).expect("tiles");
         check(&raster, &union(&tiles), error);
     }
+}
+
+/// Sizes at which blocks, seams between strips and the search of large triangles all take part.
+#[test]
+fn large_rasters_keep_their_error_too() {
+    let sizes = [(257, 257), (300, 131), (193, 400), (513, 67), (140, 2), (3, 500)];
+    let grounds = [Ground::Hills, Ground::Whole, Ground::Spikes, Ground::Slope, Ground::Flat];
+    let gaps = [Gaps::None, Gaps::Few, Gaps::None, Gaps::Block, Gaps::Wedge];
+    for (seed, (columns, rows)) in sizes.into_iter().enumerate() {
+        for (ground, gaps) in grounds.into_iter().zip(gaps) {
+            let raster = raster(columns, rows, ground, gaps, seed as u64);
+            let rtin = Rtin::new(&raster);
+            for error in [0.0, 0.7, 12.0, 60.0] {
+                let mut mesh = Triangulation::default();
+                rtin.extract(&raster, error, &mut mesh).expect("a mesh");
+                check(&raster, &mesh, error);
+                let mesh = tin::triangulate(&raster, error, &|_| true).expect("a mesh");
+                check(&raster, &mesh, error);
+                assert_eq!(verify_delaunay(&raster, &mesh), Ok(()));
+            }
+        }
+    }
+}
+
+#[test]
+fn planes_need_two_triangles() {
+    for ground in [Ground::Flat, Ground::Slope] {
+        for (columns, rows) in [(2, 2), (65, 65), (300, 300), (41, 17)] {
+            let raster = raster(columns, rows, ground, Gaps::None, 3);
+            let mesh = tin::triangulate(&raster, 0.0, &|_| true).expect("a mesh");
+            assert_eq!(mesh.triangles.len(), 2, "{ground:?}, {columns} × {rows}");
+            let mut mesh = Triangulation::default();
+            Rtin::new(&raster).extract(&raster, 0.0, &mut mesh).expect("a mesh");
+            // Cut at the border, the halves of the virtual square may be four corners each.
+            assert!(mesh.triangles.len() <= 4, "{ground:?}, {columns} × {rows}: {}", mesh.triangles.len());
+        }
+    }
+}
+
+#[test]
+fn warm_extraction_allocates_nothing() {
+    for (columns, gaps) in [(129, Gaps::None), (100, Gaps::None), (100, Gaps::Block)] {
+        let raster = raster(columns, 129, Ground::Hills, gaps, 5);
+        let rtin = Rtin::new(&raster);
+        let (mut mesh, mut scratch) = (Triangulation::default(), Scratch::default());
+        let mut extract = || {
+            for error in [5.0, 1.0, 20.0] {
+                rtin.extract_with(&raster, error, &mut scratch, &mut mesh).expect("a mesh");
+            }
+        };
+        extract();
+        let before = allocations();
+        extract();
+        assert_eq!(allocations(), before);
+    }
+}
+
+#[test]
+fn progress_rises_and_stops_the_work() {
+    let raster = raster(200, 200, Ground::Noise, Gaps::None, 5);
+    let last = std::sync::Mutex::new(0.0);
+    tin::triangulate(&raster, 5.0, &|done| {
+        let before = std::mem::replace(&mut *last.lock().expect("one thread"), done);
+        assert!((before..=1.0).contains(&done), "{before}, then {done}");
+        true
+    })
+    .expect("a mesh");
+    assert!(*last.lock().expect("one thread") == 1.0);
+    assert_eq!(tin::triangulate(&raster, 5.0, &|_| false), Err(MeshError::Stopped));
+}
+
+#[test]
+fn tiles_that_make_no_sense_are_refused() {
+    let raster = raster(9, 9, Ground::Hills, Gaps::None, 1);
+    let mesh = |size, side, error, read: Raster| {
+        Tiling { size, side }
+            .mesh(Method::Tin, error, &mut |_| Ok(read.clone()), &mut |_, _, _| Ok(()))
+            .map_err(|error: MeshError| error)
+    };
+    assert_eq!(mesh([9, 9], 3, 1.0, raster.clone()), Err(MeshError::Tiles { size: [9, 9], side: 3 }));
+    assert_eq!(mesh([9, 1], 8, 1.0, raster.clone()), Err(MeshError::Tiles { size: [9, 1], side: 8 }));
+    assert!(matches!(mesh([9, 9], 8, f32::NAN, raster.clone()), Err(MeshError::Tolerance(_))));
+    let other = MeshError::OtherRaster { expected: [10, 9], got: [9, 9] };
+    assert_eq!(mesh([17, 9], 8, 1.0, raster), Err(other));
 }
 
 #[test]

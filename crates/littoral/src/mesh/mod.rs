@@ -72,9 +72,10 @@ pub(crate) fn tolerance(max_error: f32) -> Result<f32, MeshError> {
 }
 
 impl Triangulation {
-    /// Takes away vertices that no triangle names.
-    pub(crate) fn drop_unused(&mut self) {
-        let mut names = vec![u32::MAX; self.vertices.len()];
+    /// Takes away vertices that no triangle names; `names` is scratch.
+    pub(crate) fn drop_unused(&mut self, names: &mut Vec<u32>) {
+        names.clear();
+        names.resize(self.vertices.len(), u32::MAX);
         self.triangles.iter().flatten().for_each(|&vertex| names[vertex as usize] = 0);
         let mut kept = 0;
         for (name, vertex) in names.iter_mut().zip(0..) {

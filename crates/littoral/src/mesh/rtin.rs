@@ -21,11 +21,14 @@ mod border;
 mod cut;
 mod grow;
 mod prepare;
+mod rows;
 mod search;
+mod states;
 
 use super::{MeshError, Triangulation, tolerance};
 use crate::field::Raster;
 use grow::Growth;
+pub use grow::Scratch;
 
 /// Where the deviations of one size of squares lie.
 #[derive(Clone, Copy, Debug)]
@@ -161,15 +164,27 @@ impl Rtin {
     /// # Errors
     /// If `max_error` is negative or no number, or the raster is of another size.
     pub fn extract(&self, raster: &Raster, max_error: f32, into: &mut Triangulation) -> Result<(), MeshError> {
+        self.extract_with(raster, max_error, &mut Scratch::default(), into)
+    }
+
+    /// The same with scratch of the caller's, so that nothing is allocated where as much was before.
+    ///
+    /// # Errors
+    /// As [`Rtin::extract`].
+    pub fn extract_with(
+        &self,
+        raster: &Raster,
+        max_error: f32,
+        scratch: &mut Scratch,
+        into: &mut Triangulation,
+    ) -> Result<(), MeshError> {
         let got = [raster.columns(), raster.rows()];
         if got != self.size {
             return Err(MeshError::OtherRaster { expected: self.size, got });
         }
-        let max_error = tolerance(max_error)?;
-        let mut growth = Growth::new(self, raster, max_error, into);
-        growth.grow();
+        Growth::new(self, raster, tolerance(max_error)?, scratch, into).grow()?;
         if raster.voids().any() {
-            into.drop_unused();
+            into.drop_unused(&mut scratch.names);
         }
         Ok(())
     }

@@ -152,7 +152,7 @@ fn finished(net: Net, raster: &Raster) -> Triangulation {
     let triangles = (0..net.triangles()).filter(kept).map(corners).collect();
     let mut mesh = Triangulation { vertices: net.vertices, triangles };
     if voids {
-        mesh.drop_unused();
+        mesh.drop_unused(&mut Vec::new());
     }
     mesh
 }

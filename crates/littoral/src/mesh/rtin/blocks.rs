@@ -14,13 +14,13 @@ pub(super) const LANES: usize = 16;
 
 const LINE: usize = SIDE + 1;
 
-type Lanes = [f32; LANES];
+pub(super) type Lanes = [f32; LANES];
 
 /// What rounding may add to an error computed in single precision, as a share of the greatest height that it is computed
 /// from, and of itself: six roundings of numbers not above twice that height, and one of the difference, each of half a last
 /// digit.
-const OF_HEIGHT: f32 = 4.0 * f32::EPSILON;
-const OF_ERROR: f32 = 2.0 * f32::EPSILON;
+pub(super) const OF_HEIGHT: f32 = 4.0 * f32::EPSILON;
+pub(super) const OF_ERROR: f32 = 2.0 * f32::EPSILON;
 
 /// Samples of sixteen blocks, and the deviations of their squares.
 pub(super) struct Blocks {
@@ -63,6 +63,12 @@ impl Blocks {
     ) {
         lay_out(heights, columns, corners, &mut self.samples);
         measure(&self.samples, rises, exact, &mut self.found);
+    }
+
+    /// How far the samples of the blocks measured last are from two planes each, one on either side of the blocks' diagonal,
+    /// the southern side first; on it counts for both.
+    pub fn beside(&self, rises: bool, planes: &[Planes; 2]) -> [Lanes; 2] {
+        beside(&self.samples, rises, planes)
     }
 
     /// Row y of the centres of a size, of the sides south of it, or of those west and east of its squares.
@@ -236,6 +242,31 @@ fn squares<const S: usize>(samples: &[Lanes], rises: bool, exact: bool, found: &
 #[inline(always)]
 fn sides_to_zero(sides: &mut [Lanes]) {
     sides.fill([0.0; LANES]);
+}
+
+/// A plane in each lane: its height at the south-western sample of a block, and how it rises from a sample to the next.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Planes {
+    pub base: Lanes,
+    pub east: Lanes,
+    pub north: Lanes,
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn beside(samples: &[Lanes], rises: bool, [south, north]: &[Planes; 2]) -> [Lanes; 2] {
+    let (mut in_south, mut in_north) = ([0.0; LANES], [0.0; LANES]);
+    for (y, line) in samples.chunks_exact(LINE).enumerate() {
+        let up = y as f32;
+        let (south_base, north_base) = (linear(&south.north, up, &south.base), linear(&north.north, up, &north.base));
+        if rises {
+            farthest(&mut in_north, &north_base, &north.east, 0, &line[..=y]);
+            farthest(&mut in_south, &south_base, &south.east, y as i32, &line[y..]);
+        } else {
+            farthest(&mut in_south, &south_base, &south.east, 0, &line[..LINE - y]);
+            farthest(&mut in_north, &north_base, &north.east, (SIDE - y) as i32, &line[SIDE - y..]);
+        }
+    }
+    [in_south, in_north]
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]

@@ -49,7 +49,8 @@ impl Rtin {
     /// Calls `visit` for all vertices that some on the border depend on, and those themselves: the size of the squares, the
     /// place, and whether it is a centre, a southern or northern side, or a western or eastern one.
     fn visit_ancestors(&self, sides: &Sides, mut visit: impl FnMut(usize, usize, usize, usize)) {
-        let (mut centres, mut seen): (Vec<[usize; 2]>, Vec<(usize, usize, usize)>) = (Vec::new(), Vec::new());
+        let mut centres: Vec<[usize; 2]> = Vec::new();
+        let mut seen: Vec<(usize, usize, usize)> = Vec::new();
         for k in 0..self.levels.len() {
             let level = &self.levels[k];
             seen.clear();

@@ -6,11 +6,11 @@
 use super::cut::Cut;
 use super::{Corners, Part, Rtin, halves, quarter};
 use crate::field::Raster;
-use crate::mesh::Triangulation;
 use crate::mesh::measure::{doubled_area, lies_on_surface};
+use crate::mesh::{MeshError, Triangulation};
 
 /// A square whose centre is a vertex.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Square {
     x: u32,
     y: u32,
@@ -28,18 +28,45 @@ pub(super) struct Growth<'a> {
     max_error: f32,
     mesh: &'a mut Triangulation,
     last: [u32; 2],
+    scratch: &'a mut Scratch,
+}
+
+/// Memory that extractions use again and again.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    squares: Vec<Square>,
+    finer: Vec<Square>,
+    /// Of the finer squares those in the upper half of a row.
+    upper: Vec<Square>,
+    /// Vertices on the sides between two rows of squares.
+    line: Vec<u32>,
     /// Vertices on the eastern and northern border, where triangles are cut.
     east: Vec<u32>,
     north: Vec<u32>,
+    /// New names of vertices.
+    pub(super) names: Vec<u32>,
+}
+
+/// All of a line of vertices without any.
+fn clear(line: &mut Vec<u32>, length: usize) {
+    line.clear();
+    line.resize(length, NONE);
 }
 
 impl Growth<'_> {
-    pub fn new<'a>(rtin: &'a Rtin, raster: &'a Raster, max_error: f32, mesh: &'a mut Triangulation) -> Growth<'a> {
+    pub fn new<'a>(
+        rtin: &'a Rtin,
+        raster: &'a Raster,
+        max_error: f32,
+        scratch: &'a mut Scratch,
+        mesh: &'a mut Triangulation,
+    ) -> Growth<'a> {
         mesh.vertices.clear();
         mesh.triangles.clear();
         let last = rtin.size.map(|samples| samples as u32 - 1);
-        let (east, north) = (vec![NONE; rtin.size[1]], vec![NONE; rtin.size[0]]);
-        Growth { rtin, raster, max_error, mesh, last, east, north }
+        clear(&mut scratch.east, rtin.size[1]);
+        clear(&mut scratch.north, rtin.size[0]);
+        Growth { rtin, raster, max_error, mesh, last, scratch }
     }
 
     fn active(&self, index: usize) -> bool {
@@ -52,9 +79,9 @@ impl Growth<'_> {
         let border = if at[0] > self.last[0] || at[1] > self.last[1] {
             return NONE;
         } else if at[0] == self.last[0] {
-            &mut self.east[at[1] as usize]
+            &mut self.scratch.east[at[1] as usize]
         } else if at[1] == self.last[1] {
-            &mut self.north[at[0] as usize]
+            &mut self.scratch.north[at[0] as usize]
         } else {
             self.mesh.vertices.push(at);
             return new;
@@ -98,7 +125,7 @@ impl Growth<'_> {
         }
     }
 
-    pub fn grow(&mut self) {
+    pub fn grow(&mut self) -> Result<(), MeshError> {
         let top = self.rtin.levels.len() - 1;
         let side = 2u32 << top;
         let places = [[0, 0], [side, 0], [0, side], [side, side]];
@@ -107,14 +134,21 @@ impl Growth<'_> {
             let [a, b] = halves(0, 0, side, true);
             self.emit(a, [corners[0], corners[1], corners[3]]);
             self.emit(b, [corners[0], corners[3], corners[2]]);
-            return;
+            return Ok(());
         }
-        let mut squares = vec![Square { x: 0, y: 0, corners }];
-        let (mut finer, mut upper) = (Vec::new(), Vec::new());
+        let take = std::mem::take::<Vec<Square>>;
+        let mut squares = take(&mut self.scratch.squares);
+        let (mut finer, mut upper) = (take(&mut self.scratch.finer), take(&mut self.scratch.upper));
+        let mut line = std::mem::take(&mut self.scratch.line);
+        squares.clear();
+        squares.push(Square { x: 0, y: 0, corners });
         let solid = !self.raster.voids().any();
         for k in (0..=top).rev() {
+            if self.mesh.vertices.len() + 8 * squares.len() > NONE as usize {
+                return Err(MeshError::TooMany);
+            }
             finer.clear();
-            let mut line = vec![NONE; self.rtin.levels[k].columns];
+            clear(&mut line, self.rtin.levels[k].columns);
             for row in squares.chunk_by(|a, b| a.y == b.y) {
                 let mut east = NONE;
                 for square in row {
@@ -128,6 +162,13 @@ impl Growth<'_> {
             }
             std::mem::swap(&mut squares, &mut finer);
         }
+        // Each where it was, so that the next time it is large enough.
+        if top.is_multiple_of(2) {
+            std::mem::swap(&mut squares, &mut finer);
+        }
+        (self.scratch.squares, self.scratch.finer, self.scratch.upper) = (squares, finer, upper);
+        self.scratch.line = line;
+        Ok(())
     }
 
     /// The same as [`Growth::split`] for most squares: those that nothing is cut from and that touch no border where triangles

@@ -183,8 +183,8 @@ fn small(ground: &Ground, spans: &Spans, west_of: impl Fn(u32, u32) -> f64, east
             let mut at = u32::MAX;
             row_errors(line, (last - first + 1) as usize, west_of(row, first), east, |errors, column| {
                 let mut hits = 0;
-                for lane in 0..LANES {
-                    hits |= u32::from(errors[lane] == found.error) << lane;
+                for (lane, error) in errors.iter().enumerate() {
+                    hits |= u32::from(*error == found.error) << lane;
                 }
                 if hits != 0 && at == u32::MAX {
                     at = first + column as u32 + hits.trailing_zeros();
@@ -297,5 +297,60 @@ fn look(
                 }
             }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Candidates of triangles of all sizes against every sample by its definition.
+    #[test]
+    fn no_sample_is_farther_than_the_candidate() {
+        let columns = 400usize;
+        let mut state = 88_172_645_463_325_252_u64;
+        let mut random = move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let height = |i: usize| {
+            let (x, y) = ((i % columns) as f32, (i / columns) as f32);
+            300.0 * (x * 0.03).sin() * (y * 0.02).cos()
+        };
+        let heights: Vec<f32> = (0..columns * columns).map(|i| height(i) + 20.0 * random() as f32).collect();
+        let tiles = Tiles::new(&heights, columns);
+        for _ in 0..2000 {
+            let size = 400.0 * random() * random();
+            let mut corner = || [0, 0].map(|_: u32| ((random() * size) + 200.0 * size / 400.0).min(399.0) as u32);
+            let corners = [corner(), corner(), corner()];
+            let area = crate::mesh::measure::doubled_area(corners);
+            if area == 0 {
+                continue;
+            }
+            let corners = if area > 0 { corners } else { [corners[0], corners[2], corners[1]] };
+            let ground = Ground { heights: &heights, columns, tiles: &tiles, max_error: 1.0, kept_border: None };
+            let candidate = ground.candidate(corners);
+            let plane = Plane::new(&heights, columns, corners);
+            let mut worst = 0f64;
+            let mut at_candidate = None;
+            for (i, &height) in heights.iter().enumerate() {
+                let (x, y) = ((i % columns) as u32, (i / columns) as u32);
+                let edges = [[0, 1], [1, 2], [2, 0]].map(|[a, b]: [usize; 2]| [corners[a], corners[b], [x, y]]);
+                if edges.iter().all(|edge| crate::mesh::measure::doubled_area(*edge) >= 0) {
+                    let error = plane.error(f64::from(x), f64::from(y), height);
+                    worst = worst.max(error);
+                    if candidate.at == [x, y] {
+                        at_candidate = Some(error);
+                    }
+                }
+            }
+            assert!((f64::from(candidate.error) - worst).abs() < 2e-3, "{corners:?}: {candidate:?}, {worst}");
+            if worst > 1.01 {
+                assert!(at_candidate.is_some_and(|error| (error - worst).abs() < 2e-3), "{corners:?}: {candidate:?}");
+                assert!(!corners.contains(&candidate.at));
+            }
+        }
     }
 }
