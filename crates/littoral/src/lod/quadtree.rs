@@ -136,7 +136,7 @@ impl Quadtree {
     fn list(&mut self, field: &dyn HeightField, metric: &ScreenMetric) {
         self.leaves.clear();
         self.index.clear();
-        let bound = |cell: Cell| metric.cell(field, cell, field.stencil_error(cell, DEPTH)).map(|(_, pixels)| pixels);
+        let bound = |cell: Cell| bound(field, metric, cell, DEPTH);
         if self.cut.is_empty() {
             if let Some(own) = bound(Cell::face(0)) {
                 self.index.insert(Cell::face(0), 0);
@@ -290,6 +290,16 @@ impl Quadtree {
             }
         }
     }
+}
+
+/// The bound (pixels) of a cell drawn in cells `depth` levels below it; `None` if nothing of it is seen. Where it is larger than the tolerance, which it is
+/// near the eye, it is that of the parts.
+fn bound(field: &dyn HeightField, metric: &ScreenMetric, cell: Cell, depth: u8) -> Option<f32> {
+    let (_, pixels) = metric.cell(field, cell, field.stencil_error(cell, depth))?;
+    if pixels <= metric.tolerance() || depth == 0 || cell.level == Cell::MAX_LEVEL {
+        return Some(pixels);
+    }
+    cell.children().into_iter().filter_map(|child| bound(field, metric, child, depth - 1)).reduce(f32::max)
 }
 
 /// The cell of the same level beyond a side; `None` where the face ends.
