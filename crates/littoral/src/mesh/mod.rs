@@ -1,7 +1,17 @@
 //! Meshes of a whole raster within a bound of error: for printers, physics, web maps and whoever eats triangles once.
 //!
 //! A [`Triangulation`] names samples by integers, so that whether it covers the raster exactly once, without a crack or an
-//! overlap, can be decided exactly.
+//! overlap, can be decided exactly. A [`Model`] gives it places, normals, a waterline and a base.
+
+mod base;
+mod edges;
+mod model;
+mod pieces;
+mod shoreline;
+
+use edges::Edges;
+pub use model::{Form, Model, ModelError};
+pub use pieces::Pieces;
 
 pub mod measure;
 pub mod rtin;
