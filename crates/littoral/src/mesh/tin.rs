@@ -1,9 +1,10 @@
-//! Triangulated irregular networks: the fewest triangles, Delaunay, within a bound that holds at every sample.
+//! Triangulated irregular networks: few triangles, Delaunay, within a bound that holds at every sample.
 //!
 //! Greedy insertion: the sample that is farthest from the triangulation becomes a vertex, until none is farther than was
 //! asked for. Not the farthest of all each time: the threshold falls in phases, and in a phase one triangle after another is
 //! refined with what arises from it, so that what is worked on lies in the caches, and a triangle is looked at when it is
-//! settled and not each time a neighbour flips it. That takes a fifth of the time and no more triangles.
+//! settled and not each time a neighbour flips it: less work than a queue of all triangles by their error, and no more
+//! triangles. Large triangles are searched by the ranges of small squares of samples.
 //!
 //! Voids are cut out: the corners of their outline become vertices at once, and more samples on it until all of it is edges of
 //! the triangulation, which then are fixed. Edges between neighbouring samples always are edges of a Delaunay triangulation, so
@@ -26,7 +27,8 @@ use candidate::{Candidate, Ground};
 use net::{CHANGED, Net, OUTSIDE};
 use tiles::Tiles;
 
-/// By how much the threshold falls from phase to phase: less makes fewer triangles, and more work.
+/// By how much the threshold falls from phase to phase. Slower makes fewer triangles and more work: on 4097² samples of mountains
+/// at 10 m, 0.7 makes 0.4 % fewer and takes 15 % longer, 0.5 makes 1.3 % more and takes 15 % less.
 const FALL: f32 = 0.6;
 
 /// Meshes a raster with about as few triangles as possible so that no sample of it is farther than `max_error` (m) from them,

@@ -66,7 +66,7 @@ impl Ground<'_> {
     }
 }
 
-/// What keeps lanes out: the last of these numbers but so many.
+/// The greatest error that a lane may tell: any in the first half, none in the second; from where it begins depends how many do.
 const KEPT: [f32; 2 * LANES] = {
     let mut kept = [-1.0; 2 * LANES];
     let mut lane = 0;
