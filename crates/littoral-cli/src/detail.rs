@@ -7,7 +7,7 @@ use crate::talk::{Failure, Talk, tidy};
 use clap::ValueEnum;
 use glam::DVec3;
 use littoral::field::{HeightField, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, Patches, Quadtree, Reached, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Nested, Patches, Quadtree, Reached, Whole};
 use littoral::space::View;
 use std::time::Instant;
 
@@ -36,6 +36,8 @@ pub struct Detail {
 pub enum Method {
     /// Everything equally fine: what the others are measured by
     Whole,
+    /// Nested square windows, joined by upright strips: for seas
+    Nested,
     /// A restricted quadtree whose patches morph
     Quadtree,
     /// Triangles cut level by level, edges deciding
@@ -47,6 +49,7 @@ impl Method {
     pub fn within(self, limits: Limits) -> Box<dyn Lod> {
         match self {
             Method::Whole => Box::new(Whole::new(limits)),
+            Method::Nested => Box::new(Nested::new(limits)),
             Method::Quadtree => Box::new(Quadtree::new(limits)),
             Method::Patches => Box::new(Patches::new(limits)),
         }

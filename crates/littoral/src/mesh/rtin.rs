@@ -12,6 +12,9 @@
 //! Rasters of any size lie in a virtual square of 2ᵏ patches a side. Triangles that leave the raster are cut at its border:
 //! edges are parallel to the axes or diagonal, so every cut is a sample. A triangle that is partly void must be split.
 //!
+//! The bound is one at samples. Between them it holds, too, for the bilinear surface over patches that no edge cuts; along a
+//! diagonal through a patch that surface is a parabola, which may be farther by a quarter of the patch's twist.
+//!
 //! Works this rests on: W. Evans, D. Kirkpatrick, G. Townsend, "Right-triangulated irregular networks", 2001 (the triangles);
 //! M. Duchaineau et al., "ROAMing terrain", 1997 (diamonds); P. Lindstrom and V. Pascucci, "Terrain simplification
 //! simplified", 2002 (nested bounds).

@@ -214,6 +214,38 @@ impl Drawn {
     }
 }
 
+/// How far above its place each pixel shows a mesh of `field` (pixels; negative for below): where the ray through the pixel's middle meets the mesh, the
+/// surface is raised or lowered to it. NaN where no mesh is seen. Row by row from the top left.
+pub fn mesh_errors(mesh: &Mesh, field: &dyn HeightField, view: &View) -> Vec<f32> {
+    let datum = field.datum();
+    let drawn = Drawn::new(mesh, &datum, view);
+    let (corner, right, down) = view.frame();
+    let width = view.size.x as usize;
+    let mut errors = vec![f32::NAN; width * view.size.y as usize];
+    errors.par_chunks_mut(width.max(1)).enumerate().for_each(|(y, line)| {
+        let direction = |x: usize| (corner + right * (x as f32 + 0.5) + down * (y as f32 + 0.5)).normalize();
+        let directions: Vec<Vec3> = (0..width).map(direction).collect();
+        let (mut columns, mut places, mut seen) = (Vec::new(), Vec::new(), Vec::new());
+        drawn.hits(&directions, |x, distance, _| {
+            let world = view.eye + directions[x].as_dvec3() * f64::from(distance);
+            let (place, height) = datum.place(world);
+            columns.push(x);
+            places.push(place);
+            seen.push((world, height));
+        });
+        let mut heights = vec![0.0; places.len()];
+        field.heights(&places, &mut heights);
+        for (i, &x) in columns.iter().enumerate() {
+            let (world, height) = seen[i];
+            let true_place = datum.world(places[i], f64::from(heights[i])).0;
+            if let (Some(here), Some(there)) = (view.pixel(world), view.pixel(true_place)) {
+                line[x] = here.distance(there) * (height - f64::from(heights[i])).signum() as f32;
+            }
+        }
+    });
+    errors
+}
+
 /// Pixels that a triangle may cover: first and last column, first and last row.
 fn cover(view: &View, corners: [DVec3; 3], last: UVec2) -> [u16; 4] {
     const NONE: [u16; 4] = [1, 0, 1, 0];

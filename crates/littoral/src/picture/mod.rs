@@ -37,7 +37,7 @@ mod waves;
 
 pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
 pub use display::{Display, Exposure, Medium, Picture};
-pub use drawn::Meshes;
+pub use drawn::{Meshes, mesh_errors};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
 

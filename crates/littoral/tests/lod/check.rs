@@ -141,6 +141,10 @@ pub fn check(lod: &mut dyn Lod, case: &Case, random: &mut Random) {
     let check_point = |p: DVec2, t: &Triangle| {
         let Some(drawn) = t.height_over(p) else { return };
         let Some(surface) = sight.height(p) else { return };
+        // Far off, a point may be drawn where the frame does not reach, nor the bound.
+        if reached.limited && !sight.seen(sight.world(p, drawn)) {
+            return;
+        }
         if let Some(off) = sight.off(p, surface, drawn) {
             let rounding = sight.off(p, surface, surface + 2e-6 * surface.abs().max(1.0)).unwrap_or(0.0);
             assert!(
