@@ -1,8 +1,9 @@
 //! Models: closed when they are said to be, their surface the same with a waterline cut in, their normals those of the data.
 
 use glam::{DVec2, DVec3, Vec3};
-use littoral::field::Raster;
-use littoral::mesh::{Form, Model, ModelError, Triangulation};
+use littoral::field::{Raster, Window};
+use littoral::mesh::tiled::{Method, Tiling};
+use littoral::mesh::{Form, MeshError, Model, ModelError, Pieces, Triangulation};
 use proptest::prelude::*;
 use std::collections::HashMap;
 
@@ -84,7 +85,7 @@ fn height_of(positions: &[DVec3], triangles: &[[u32; 3]], at: DVec2) -> Option<f
         let area = (b - a).truncate().perp_dot((c - a).truncate());
         let part = |p: DVec3, q: DVec3| (p.truncate() - at).perp_dot(q.truncate() - at) / area;
         let (u, v, w) = (part(b, c), part(c, a), part(a, b));
-        (area > 0.0 && u.min(v).min(w) >= -1e-12).then(|| u * a.z + v * b.z + w * c.z)
+        (area > 0.0 && u.min(v).min(w) >= -1e-12).then_some(u * a.z + v * b.z + w * c.z)
     })
 }
 
@@ -122,6 +123,35 @@ proptest! {
         // No vertex below but for walls: each stands under one of the border.
         let walls = model.triangles[model.ground_triangles..].iter().filter(|t| t.iter().any(|&v| (v as usize) < model.normals.len()));
         prop_assert_eq!(walls.count(), 2 * mesh_bottom(&model));
+    }
+
+    #[test]
+    fn tiles_become_one_model(raster in rasters(), level in -3f64..4.0, rtin: bool, error in 0f32..9.0) {
+        let tiling = Tiling { size: [raster.columns(), raster.rows()], side: 2 };
+        let method = if rtin { Method::Rtin } else { Method::Tin };
+        let read = |window: Window| -> Result<Raster, MeshError> {
+            let row = |row| (window.column..window.column + window.columns).map(move |column| (column, row));
+            let samples = (window.row..window.row + window.rows).flat_map(row);
+            let heights = samples.map(|(column, row)| raster.sample(column, row).unwrap_or(f32::NAN)).collect();
+            Ok(Raster::new(window.columns, window.rows, raster.spacing(), heights).expect("a window"))
+        };
+        let mut pieces = Pieces::new(Some(level));
+        tiling.mesh(method, error, &mut |window| read(window), &mut |tile, _, mesh| {
+            pieces.add(mesh, tile, &raster, [0, 0]).expect("few");
+            Ok::<(), MeshError>(())
+        }).expect("meshed");
+        let form = Form { shoreline: Some(level), base: Some(-25.0), ..LATTICE };
+        match pieces.finish(&form) {
+            Ok(model) => {
+                assert_closed(&model.triangles, |vertex| vertex);
+                prop_assert!(model.volume() > 0.0);
+                prop_assert!(model.shoreline.as_flattened().iter().all(|&v| model.positions[v as usize].z == level));
+            }
+            Err(error) => {
+                prop_assert_eq!(error, ModelError::Empty);
+                prop_assert!(whole(&raster).triangles.is_empty());
+            }
+        }
     }
 
     #[test]
