@@ -12,10 +12,12 @@
 
 mod drawing;
 mod metric;
+mod roam;
 mod whole;
 
 pub use drawing::{Drawing, Edge, Mesh, Patch, Stencil, Vertex};
 pub use metric::{Bounds, ScreenMetric, ViewError};
+pub use roam::Roam;
 pub use whole::Whole;
 
 use crate::field::HeightField;

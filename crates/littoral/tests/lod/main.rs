@@ -11,7 +11,7 @@ use check::{Case, check};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::{Fbm, NoiseField};
 use littoral::field::{HeightField, Land, Raster, Sea};
-use littoral::lod::{Drawing, Limits, Lod, ViewError, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Roam, ViewError, Whole};
 use littoral::space::{Datum, View};
 use littoral::waves::{SeaState, Superposition};
 
@@ -42,7 +42,10 @@ pub struct Method {
 }
 
 /// Every method there is.
-pub const METHODS: &[Method] = &[Method { name: "whole", make: |limits| Box::new(Whole::new(limits)) }];
+pub const METHODS: &[Method] = &[
+    Method { name: "whole", make: |limits| Box::new(Whole::new(limits)) },
+    Method { name: "roam", make: |limits| Box::new(Roam::new(limits)) },
+];
 
 /// Ground, invented ground or sea, and the finest level worth drawing.
 pub struct Surface {
