@@ -250,10 +250,12 @@ impl Question<'_> {
                 continue;
             }
             *drawn = error.is_finite();
-            let bounds = if diamond.is_square() {
-                self.metric.bounds(cell, range)
+            // What is partly void is as far off as its cell is large.
+            let bounds = if diamond.is_square() || error.is_infinite() {
+                self.metric.bounds(cell, self.field.range(cell))
             } else {
-                self.halves(diamond, apex).map(|half| self.metric.bounds(half, range)).into_iter().reduce(|a, b| a.union(b)).expect("two")
+                let [a, b] = self.halves(diamond, apex).map(|half| self.metric.bounds(half, range));
+                a.union(b)
             };
             if self.metric.sees(&bounds) {
                 void |= error.is_infinite();
