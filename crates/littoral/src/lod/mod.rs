@@ -17,7 +17,7 @@ mod whole;
 
 pub use drawing::{Drawing, Edge, Mesh, Patch, Stencil, Vertex};
 pub use metric::{Bounds, ScreenMetric, ViewError};
-pub use roam::Roam;
+pub use roam::{NestedBounds, Priority, Roam, RoamFlight};
 pub use whole::Whole;
 
 use crate::field::HeightField;

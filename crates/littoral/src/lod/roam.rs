@@ -18,7 +18,14 @@
 //! adapting meshes", 1997; spec page of 1999, which uses it for a sea; P. Lindstrom and V. Pascucci, "Terrain simplification
 //! simplified", 2002 (vertices instead of triangles).
 
+mod bounds;
 mod diamond;
+mod flight;
+mod scan;
+
+pub use bounds::NestedBounds;
+pub use flight::RoamFlight;
+pub use scan::Priority;
 
 use super::{Drawing, Limits, Lod, Reached, ScreenMetric, Vertex, ViewError};
 use crate::field::HeightField;

@@ -6,6 +6,7 @@
 
 mod check;
 mod memory;
+mod roam;
 
 use check::{Case, check};
 use glam::{DVec2, DVec3, UVec2};
@@ -58,6 +59,10 @@ pub struct Surface {
 }
 
 pub fn random_land(columns: usize, rows: usize, random: &mut Random) -> Surface {
+    surface_of(random_terrain(columns, rows, random))
+}
+
+pub fn random_terrain(columns: usize, rows: usize, random: &mut Random) -> Land {
     let kind = random.below(5);
     let void_share = [0.0, 0.0, 0.03, 0.4][random.below(4) as usize];
     let fbm = Fbm::new(9.0, 50.0, 4, random.below(1000));
@@ -75,9 +80,13 @@ pub fn random_land(columns: usize, rows: usize, random: &mut Random) -> Surface 
     });
     let heights: Vec<f32> = heights.collect();
     let spacing = DVec2::new(0.5 + random.unit() * 10.0, 0.5 + random.unit() * 10.0);
-    let land = Land::new(Raster::new(columns, rows, spacing, heights).expect("sizes are valid"));
+    Land::new(Raster::new(columns, rows, spacing, heights).expect("sizes are valid"))
+}
+
+pub fn surface_of(land: Land) -> Surface {
     let (finest, extent, origin) = (land.finest_level(), land.extent(), land.origin());
-    Surface { field: Box::new(land), finest, samples: Some((columns, rows)), extent, origin }
+    let samples = Some((land.raster().columns(), land.raster().rows()));
+    Surface { field: Box::new(land), finest, samples, extent, origin }
 }
 
 pub fn random_surface(random: &mut Random) -> Surface {
