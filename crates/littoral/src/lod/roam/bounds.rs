@@ -160,21 +160,35 @@ impl NestedBounds {
         at.map(|c| (c >> (Cell::MAX_LEVEL - self.finest)) as usize)
     }
 
-    /// The bound of a diamond; empty below the level of the samples, save for the patches themselves.
+    /// Where the bound of a diamond above the level of the samples is kept.
     #[inline]
-    pub(super) fn bound(&self, diamond: Diamond) -> Bound {
+    fn slot(&self, diamond: Diamond) -> &Bound {
         let level = diamond.cell_level();
-        if level >= self.finest {
-            return self.patch(diamond);
-        }
         let of = &self.levels[usize::from(level)];
         let n = 1usize << level;
         let [i, j] = diamond.at.map(|c| (c >> (Cell::MAX_LEVEL - level)) as usize);
         match diamond.base {
-            Base::Rising | Base::Falling => of.squares[j * n + i],
-            Base::East => of.east[j * n + i],
-            Base::North => of.north[j * (n + 1) + i],
+            Base::Rising | Base::Falling => &of.squares[j * n + i],
+            Base::East => &of.east[j * n + i],
+            Base::North => &of.north[j * (n + 1) + i],
         }
+    }
+
+    /// Begins to load what a split of the diamond will ask for.
+    pub(super) fn expect(&self, diamond: Diamond) {
+        let [x, y] = self.sample(diamond.at);
+        prefetch(&self.heights[y * self.side + x]);
+        for child in diamond.children().into_iter().flatten() {
+            if child.cell_level() < self.finest {
+                prefetch(self.slot(child));
+            }
+        }
+    }
+
+    /// The bound of a diamond; empty below the level of the samples, save for the patches themselves.
+    #[inline]
+    pub(super) fn bound(&self, diamond: Diamond) -> Bound {
+        if diamond.cell_level() >= self.finest { self.patch(diamond) } else { *self.slot(diamond) }
     }
 
     fn corners(&self, x: usize, y: usize) -> Option<[f32; 4]> {
@@ -291,6 +305,18 @@ impl NestedBounds {
         }
         worst + 0.25 * twist + (8.0 * size + worst) * 8.0 * f32::EPSILON
     }
+}
+
+/// Begins to load a line of memory.
+#[inline]
+fn prefetch<T>(what: &T) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: a hint; it reads nothing that the program can see.
+    unsafe {
+        std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(std::ptr::from_ref(what).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = what;
 }
 
 /// The greatest distance of `heights` from the line `start + i · step`.

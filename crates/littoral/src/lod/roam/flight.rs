@@ -16,20 +16,17 @@
 
 use super::bounds::{Bound, NestedBounds};
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
-use super::scan::{Item, Lens, List, Priority};
+use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
 use crate::space::{Cell, View};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-const NONE: u32 = u32::MAX;
+#[cfg(test)]
+mod tests;
 
-/// Lists that a record can be in: of what may be split, of what may be merged, and of what would be split if that were allowed.
-const SPLIT: u8 = 0;
-const MERGE: u8 = 1;
-const STUCK: u8 = 2;
-const NOWHERE: u8 = 3;
+const NONE: u32 = u32::MAX;
 
 /// How far beyond the last frame's border priorities enter the queues at first.
 const BAND: f32 = 1.01;
@@ -48,7 +45,7 @@ struct Record {
     /// Vertices at the ends of its base.
     ends: [u32; 2],
     bound: Bound,
-    /// Where it is in its list.
+    /// Where it is in the list, and as what.
     place: u32,
     list: u8,
     split: bool,
@@ -69,6 +66,10 @@ struct Key {
 }
 
 impl Key {
+    fn at(&self) -> Point {
+        [(self.name >> 32) as u32, self.name as u32]
+    }
+
     fn number(&self) -> f32 {
         f32::from_bits(self.priority)
     }
@@ -88,7 +89,7 @@ pub struct RoamFlight<'a> {
     turn: u32,
     records: Vec<Record>,
     unused: Vec<u32>,
-    lists: [List; 3],
+    list: List,
     /// What may be split, above `low`; what may be merged, up to `high`.
     splits: BinaryHeap<Key>,
     merges: BinaryHeap<Reverse<Key>>,
@@ -165,7 +166,7 @@ impl<'a> RoamFlight<'a> {
             turn: 0,
             records: Vec::new(),
             unused: Vec::new(),
-            lists: Default::default(),
+            list: List::default(),
             splits: BinaryHeap::new(),
             merges: BinaryHeap::new(),
             band: (0.0, 0.0),
@@ -222,7 +223,8 @@ impl<'a> RoamFlight<'a> {
     pub fn update(&mut self, view: &View, stop: &mut dyn FnMut() -> bool) -> Result<Reached, ViewError> {
         let metric = ScreenMetric::new(view, self.bounds.datum())?;
         let steps = f64::from(STEPS >> self.shift());
-        self.lens = Some(Lens::new(&metric, self.bounds.datum(), steps, self.priority));
+        let heights = (self.bounds.base, self.bounds.step);
+        self.lens = Some(Lens::new(&metric, self.bounds.datum(), steps, heights, self.priority));
         self.tolerance = match self.priority {
             Priority::ScreenError => metric.tolerance(),
             Priority::InverseDistance => 0.0,
@@ -237,20 +239,14 @@ impl<'a> RoamFlight<'a> {
         } else if let Some(lens) = &self.lens {
             let groups = self.groups.max(1) as usize;
             let turn = self.turn as usize % groups;
-            for list in &mut self.lists {
-                let n = list.len();
-                list.measure(lens, n * turn / groups..n * (turn + 1) / groups);
-            }
+            let n = self.list.len();
+            self.list.measure(lens, n * turn / groups..n * (turn + 1) / groups);
             self.turn = self.turn.wrapping_add(1);
         }
         let stopped = self.balance(stop);
         self.compact();
-        let ends = [self.lists[usize::from(SPLIT)].worst(self.tolerance), self.lists[usize::from(STUCK)].worst(self.tolerance)];
-        let worst = ends[0].0.max(ends[1].0);
-        let pixels = match self.priority {
-            Priority::ScreenError if ends[0].1 || ends[1].1 => f32::INFINITY,
-            _ => worst,
-        };
+        let (worst, void) = self.list.worst(self.tolerance);
+        let pixels = if void && self.priority == Priority::ScreenError { f32::INFINITY } else { worst };
         Ok(Reached { pixels, limited: worst > self.tolerance || stopped })
     }
 
@@ -262,7 +258,7 @@ impl<'a> RoamFlight<'a> {
     /// The two triangles of the face.
     fn begin(&mut self) {
         self.unused.clear();
-        self.lists.iter_mut().for_each(List::clear);
+        self.list.clear();
         self.mesh.clear();
         self.owners.clear();
         self.unused_vertices.clear();
@@ -307,36 +303,39 @@ impl<'a> RoamFlight<'a> {
         self.records.len() as u32 - 1
     }
 
-    fn item(&self, record: &Record, diamond: Diamond) -> Item {
+    fn item(&self, bound: Bound, diamond: Diamond, kind: u8, record: u32) -> Item {
         let shift = self.shift();
-        let half = (diamond.half >> shift) as i32;
         Item {
-            x: (diamond.at[0] >> shift) as i32,
-            y: (diamond.at[1] >> shift) as i32,
-            half: if diamond.is_square() { 3 * half } else { 2 * half },
-            low: self.bounds.base + f32::from(record.bound.low) * self.bounds.step,
-            high: self.bounds.base + f32::from(record.bound.high) * self.bounds.step,
-            deviation: record.bound.deviation(),
+            at: diamond.at[0] >> shift | diamond.at[1] >> shift << 16,
+            heights: u32::from(bound.low) | u32::from(bound.high) << 16,
+            deviation: bound.deviation(),
+            word: Item::word(kind, diamond.is_square(), diamond.half >> shift, record),
         }
     }
 
-    /// Puts a record in a list, and in its queue if it is within the band.
-    fn join(&mut self, record: u32, list: u8) {
-        let known = self.records[record as usize];
+    /// Puts a record in the list, and in its queue if it is within the band.
+    fn join(&mut self, record: u32, kind: u8) {
+        let known = &self.records[record as usize];
         let diamond = Diamond::at(known.at);
-        let mut item = self.item(&known, diamond);
-        if item.low > item.high || known.bound.low > known.bound.high {
-            (item.low, item.high) = (1.0, 0.0);
-        }
+        let item = self.item(known.bound, diamond, kind, record);
         let priority = self.lens.as_ref().map_or(0.0, |lens| lens.priority(&item));
-        self.join_with(record, diamond, list, item, priority);
+        let place = self.list.add(item, priority);
+        let known = &mut self.records[record as usize];
+        (known.place, known.list) = (place, kind);
+        self.enqueue(record, diamond, kind, priority);
     }
 
-    fn join_with(&mut self, record: u32, diamond: Diamond, list: u8, item: Item, priority: f32) {
-        let place = self.lists[usize::from(list)].push(item, priority, record);
+    /// Makes a record one of another kind; of what it is its priority says all.
+    fn turn(&mut self, record: u32, diamond: Diamond, kind: u8) {
         let known = &mut self.records[record as usize];
-        (known.place, known.list) = (place, list);
-        match list {
+        known.list = kind;
+        self.list.turn(known.place, kind);
+        let priority = self.list.priority[known.place as usize];
+        self.enqueue(record, diamond, kind, priority);
+    }
+
+    fn enqueue(&mut self, record: u32, diamond: Diamond, kind: u8, priority: f32) {
+        match kind {
             SPLIT if priority > self.tolerance => {
                 if priority > self.band.0 {
                     self.splits.push(key(priority, diamond, record));
@@ -348,15 +347,10 @@ impl<'a> RoamFlight<'a> {
         }
     }
 
-    fn leave(&mut self, record: u32) -> (Item, f32) {
-        let Record { list, place, .. } = self.records[record as usize];
-        let list_of = &mut self.lists[usize::from(list)];
-        let item = list_of.item(place);
-        if let Some(moved) = list_of.remove(place) {
-            self.records[moved as usize].place = place;
-        }
-        self.records[record as usize].list = NOWHERE;
-        item
+    fn leave(&mut self, record: u32) {
+        let known = &mut self.records[record as usize];
+        known.list = NOWHERE;
+        self.list.remove(known.place);
     }
 
     /// Draws the triangle of a diamond on the side of one of its parents, whose vertex is `apex`.
@@ -443,7 +437,6 @@ impl<'a> RoamFlight<'a> {
 
     /// Splits a diamond that has both triangles.
     fn split(&mut self, record: u32) {
-        let (item, priority) = self.leave(record);
         let known = self.records[record as usize];
         let diamond = Diamond::at(known.at);
         self.operations.0 += 1;
@@ -498,12 +491,11 @@ impl<'a> RoamFlight<'a> {
                 self.join(of, list);
             }
         }
-        self.join_with(record, diamond, MERGE, item, priority);
+        self.turn(record, diamond, MERGE);
     }
 
     /// Merges a split diamond that has no split child.
     fn merge(&mut self, record: u32) {
-        let (item, priority) = self.leave(record);
         let known = self.records[record as usize];
         let diamond = Diamond::at(known.at);
         self.operations.1 += 1;
@@ -537,8 +529,8 @@ impl<'a> RoamFlight<'a> {
                 self.draw(record, diamond, side, apex);
             }
         }
-        let list = self.idle(diamond);
-        self.join_with(record, diamond, list, item, priority);
+        let kind = self.idle(diamond);
+        self.turn(record, diamond, kind);
         for parent in known.parents {
             if parent != NONE {
                 self.records[parent as usize].kids -= 1;
@@ -555,20 +547,19 @@ impl<'a> RoamFlight<'a> {
         let mut above = f32::INFINITY;
         loop {
             self.ready.clear();
-            let list = &self.lists[usize::from(SPLIT)];
-            let worst = list.worst(0.0).0;
+            self.list.within(SPLIT, 0.0, f32::INFINITY, &mut self.found);
+            let worst = self.found.iter().map(|&place| self.list.priority[place as usize]).fold(0.0, f32::max);
             if worst <= self.tolerance || self.triangles >= budget {
                 break;
             }
             // Triangles are about as many as the inverse of the bound; rather too few steps than one too far.
             let share = self.triangles as f32 / budget as f32;
             above = (above.min(worst) * (1.1 * share).clamp(0.3, 0.97)).max(self.tolerance);
-            list.within(above, f32::INFINITY, &mut self.found);
-            let list = &self.lists[usize::from(SPLIT)];
-            self.ready.extend(self.found.iter().map(|&at| list.record[at as usize]));
+            self.list.within(SPLIT, above, f32::INFINITY, &mut self.found);
+            self.ready.extend(self.found.iter().map(|&place| self.list.record(place)));
             while let Some(record) = self.ready.pop() {
                 let known = &self.records[record as usize];
-                if known.list == SPLIT && self.lists[usize::from(SPLIT)].priority[known.place as usize] > above {
+                if known.list == SPLIT && self.list.priority[known.place as usize] > above {
                     self.split(record);
                 }
                 if self.triangles >= budget {
@@ -583,33 +574,30 @@ impl<'a> RoamFlight<'a> {
     fn valid(&self, key: &Key, list: u8) -> bool {
         let known = &self.records[key.record as usize];
         known.list == list
-            && known.at == [(key.name >> 32) as u32, key.name as u32]
-            && self.lists[usize::from(list)].priority[known.place as usize].to_bits() == key.priority
+            && known.at == key.at()
+            && self.list.priority[known.place as usize].to_bits() == key.priority
     }
 
     /// Makes the band wider and takes what it holds into the queues.
     fn widen(&mut self, low: f32, high: f32) {
         let (low, high) = (low.min(self.band.0), high.max(self.band.1));
+        let key_of = |list: &List, records: &[Record], place: u32| {
+            let record = list.record(place);
+            key(list.priority[place as usize], Diamond::at(records[record as usize].at), record)
+        };
         if low < self.band.0 {
-            let mut found = std::mem::take(&mut self.found);
-            let list = &self.lists[usize::from(SPLIT)];
-            list.within(low.max(self.tolerance), self.band.0, &mut found);
-            for &at in &found {
-                let record = list.record[at as usize];
-                self.splits.push(key(list.priority[at as usize], Diamond::at(self.records[record as usize].at), record));
+            self.list.within(SPLIT, low.max(self.tolerance), self.band.0, &mut self.found);
+            for &place in &self.found {
+                let key = key_of(&self.list, &self.records, place);
+                if key.number() > self.border {
+                    self.bounds.expect(Diamond::at(key.at()));
+                }
+                self.splits.push(key);
             }
-            self.found = found;
         }
         if high > self.band.1 {
-            let mut found = std::mem::take(&mut self.found);
-            let list = &self.lists[usize::from(MERGE)];
-            list.within(self.band.1, high, &mut found);
-            for &at in &found {
-                let record = list.record[at as usize];
-                let key = key(list.priority[at as usize], Diamond::at(self.records[record as usize].at), record);
-                self.merges.push(Reverse(key));
-            }
-            self.found = found;
+            self.list.within(MERGE, self.band.1, high, &mut self.found);
+            self.merges.extend(self.found.iter().map(|&place| Reverse(key_of(&self.list, &self.records, place))));
         }
         self.band = (low, high);
     }
@@ -654,9 +642,10 @@ impl<'a> RoamFlight<'a> {
                         None => break,
                     }
                 }
-                (None, _) => {
-                    // Is there something below the band?
-                    if self.band.0 <= tolerance || self.triangles + 1 > budget || self.lists[usize::from(SPLIT)].len() == 0 {
+                (None, last) => {
+                    // Is there anything below the band, for which there is room or something lower to be merged?
+                    let full = self.triangles + 1 > budget;
+                    if self.band.0 <= tolerance || full && last.is_none_or(|last| last.number() > self.band.0) {
                         break;
                     }
                     wider *= wider;
@@ -671,7 +660,7 @@ impl<'a> RoamFlight<'a> {
                         self.merges.pop();
                         self.merge(last.record);
                     }
-                    None if self.band.1 == f32::INFINITY || self.lists[usize::from(MERGE)].len() == 0 => break,
+                    None if self.band.1 == f32::INFINITY => break,
                     None => {
                         wider *= wider;
                         let high = if wider.is_finite() { self.band.1.max(f32::MIN_POSITIVE) * wider } else { f32::INFINITY };
