@@ -30,7 +30,9 @@ fn main() {
     );
     scratch(&bounds, &land);
     for triangles in [100_000, 1_000_000] {
-        println!("{triangles} triangles: ms a frame, median / 99 %; diamonds split and merged a frame; millions of bisections and merges a second");
+        println!(
+            "{triangles} triangles: ms a frame, median / 99 %; diamonds split and merged a frame; millions of bisections and merges a second"
+        );
         for (name, speed, yaw) in [
             ("still", 0.0, 0.0),
             ("10 m/s", 10.0, 0.0),
@@ -140,5 +142,7 @@ fn invented(samples: usize) -> Land {
 }
 
 fn placed(samples: usize, heights: Vec<f32>) -> Land {
-    Land::new(Raster::new(samples, samples, DVec2::splat(EXTENT / (samples - 1) as f64), heights).expect("sizes are valid"))
+    Land::new(
+        Raster::new(samples, samples, DVec2::splat(EXTENT / (samples - 1) as f64), heights).expect("sizes are valid"),
+    )
 }

@@ -315,9 +315,8 @@ mod tests {
                     (at(&b) - at(&a)).perp_dot(at(v) - at(&a)) / area,
                 );
                 if wb >= 0.0 && wc >= 0.0 && wb + wc <= 1.0 {
-                    let plane = f64::from(a.height) * (1.0 - wb - wc)
-                        + f64::from(b.height) * wb
-                        + f64::from(c.height) * wc;
+                    let plane =
+                        f64::from(a.height) * (1.0 - wb - wc) + f64::from(b.height) * wb + f64::from(c.height) * wc;
                     assert!((plane - f64::from(v.height)).abs() < 1e-4, "{v:?} off {plane}");
                     found = true;
                 }

@@ -193,12 +193,18 @@ impl Roam {
         field.heights(&self.places, &mut self.heights);
         let vertex = |at: Point| {
             let corner = corners.iter().position(|&corner| corner == at);
-            corner.map_or_else(|| 4 + self.nodes[self.index[&Diamond { at, ..Diamond::ROOT }.name()] as usize].split, |i| i as u32)
+            corner.map_or_else(
+                || 4 + self.nodes[self.index[&Diamond { at, ..Diamond::ROOT }.name()] as usize].split,
+                |i| i as u32,
+            )
         };
         let split = self.split[..splits as usize].iter().map(|&node| self.nodes[node as usize].diamond.at);
-        drawing.mesh.vertices.extend(
-            corners.into_iter().chain(split).zip(&self.heights).map(|(at, &height)| Vertex { x: at[0], y: at[1], face: 0, height }),
-        );
+        drawing.mesh.vertices.extend(corners.into_iter().chain(split).zip(&self.heights).map(|(at, &height)| Vertex {
+            x: at[0],
+            y: at[1],
+            face: 0,
+            height,
+        }));
         for node in self.nodes.iter().filter(|node| node.born <= splits && node.split >= splits) {
             for (apex, drawn) in node.diamond.apexes().into_iter().zip(node.drawn) {
                 let Some(apex) = apex else { continue };

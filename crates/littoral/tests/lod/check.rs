@@ -58,7 +58,8 @@ impl Triangle {
         if area == 0.0 {
             return None;
         }
-        let (wa, wb, wc) = ((b - p).perp_dot(c - p) / area, (c - p).perp_dot(a - p) / area, (a - p).perp_dot(b - p) / area);
+        let (wa, wb, wc) =
+            ((b - p).perp_dot(c - p) / area, (c - p).perp_dot(a - p) / area, (a - p).perp_dot(b - p) / area);
         (wa >= 0.0 && wb >= 0.0 && wc >= 0.0).then(|| wa * self.height[0] + wb * self.height[1] + wc * self.height[2])
     }
 }
@@ -147,7 +148,8 @@ pub fn check(lod: &mut dyn Lod, case: &Case, random: &mut Random) {
         // Every sample of the raster.
         let step = STEPS / f64::from(((columns.max(rows) - 1) as u32).next_power_of_two());
         for t in &drawn {
-            let index = |at: i64, up: bool| if up { (at as f64 / step).ceil() } else { (at as f64 / step).floor() } as i64;
+            let index =
+                |at: i64, up: bool| if up { (at as f64 / step).ceil() } else { (at as f64 / step).floor() } as i64;
             for j in index(t.low.1, true)..=index(t.high.1, false) {
                 for i in index(t.low.0, true)..=index(t.high.0, false) {
                     check_point(DVec2::new(i as f64, j as f64) * step, t);

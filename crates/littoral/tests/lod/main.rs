@@ -103,7 +103,13 @@ pub fn random_surface(random: &mut Random) -> Surface {
         1 => {
             let fbm = Fbm::new(200.0 + 300.0 * random.unit(), 90.0, 7, random.below(100));
             let (origin, extent) = (DVec2::new(-500.0, 1e5), DVec2::new(1000.0, 2000.0));
-            Surface { field: Box::new(NoiseField { fbm, origin, size: extent }), finest: 9, samples: None, extent, origin }
+            Surface {
+                field: Box::new(NoiseField { fbm, origin, size: extent }),
+                finest: 9,
+                samples: None,
+                extent,
+                origin,
+            }
         }
         2 => {
             let (columns, rows) = (2 + random.below(3) as usize, 2 + random.below(3) as usize);
@@ -214,7 +220,10 @@ fn views_that_cannot_be_drawn_are_refused() {
         assert!(ask(good).is_ok());
         let nan = DVec3::new(0.0, f64::NAN, 1.0);
         assert!(matches!(ask(View { eye: nan, ..good }), Err(ViewError::NotFinite(_))), "{}", method.name);
-        assert!(matches!(ask(View { clip_from_eye: good.clip_from_eye * f32::NAN, ..good }), Err(ViewError::NotFinite(_))));
+        assert!(matches!(
+            ask(View { clip_from_eye: good.clip_from_eye * f32::NAN, ..good }),
+            Err(ViewError::NotFinite(_))
+        ));
         assert!(matches!(ask(View { size: UVec2::new(0, 64), ..good }), Err(ViewError::Empty(0, 64))));
         for tolerance in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert!(matches!(ask(View { tolerance_pixels: tolerance, ..good }), Err(ViewError::Tolerance(_))));

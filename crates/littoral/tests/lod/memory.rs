@@ -43,7 +43,8 @@ fn warm_calls_allocate_nothing() {
     let surface = random_land(65, 65, &mut random);
     let flight = |step: u32| {
         let at = surface.origin + surface.extent * DVec2::new(0.2 + 0.01 * f64::from(step), 0.4);
-        let mut view = View::looking_at(at.extend(80.0), (at + DVec2::new(50.0, 20.0)).extend(40.0), 1.0, UVec2::new(640, 360));
+        let mut view =
+            View::looking_at(at.extend(80.0), (at + DVec2::new(50.0, 20.0)).extend(40.0), 1.0, UVec2::new(640, 360));
         view.tolerance_pixels = 4.0;
         view
     };

@@ -60,7 +60,8 @@ fn changes_are_all_told() {
     let (mut told, mut all) = (0, 0);
     for step in 0..60 {
         let at = surface.origin + surface.extent * DVec2::new(0.1 + 0.01 * f64::from(step), 0.5);
-        let mut view = View::looking_at(at.extend(80.0), (at + DVec2::new(50.0, 20.0)).extend(40.0), 1.0, UVec2::new(640, 360));
+        let mut view =
+            View::looking_at(at.extend(80.0), (at + DVec2::new(50.0, 20.0)).extend(40.0), 1.0, UVec2::new(640, 360));
         view.tolerance_pixels = 0.01;
         if step == 30 {
             view = random_view(&surface, &mut random);

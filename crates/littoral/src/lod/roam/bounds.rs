@@ -196,7 +196,8 @@ impl NestedBounds {
             return None;
         }
         let at = y * self.side + x;
-        let all = [self.heights[at], self.heights[at + 1], self.heights[at + self.side], self.heights[at + self.side + 1]];
+        let all =
+            [self.heights[at], self.heights[at + 1], self.heights[at + self.side], self.heights[at + self.side + 1]];
         all.iter().all(|h| !h.is_nan()).then_some(all)
     }
 
@@ -224,7 +225,7 @@ impl NestedBounds {
 
     fn up(&self, height: f32) -> u16 {
         let steps = ((height - self.base) / self.step) as u16;
-        steps + u16::from(self.decoded(steps) < height) 
+        steps + u16::from(self.decoded(steps) < height)
     }
 
     /// Measures a diamond whose children are known.

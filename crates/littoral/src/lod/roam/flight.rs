@@ -18,7 +18,8 @@ use super::bounds::{Bound, NestedBounds};
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
 use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
-use crate::space::{Cell, View};
+use crate::space::{Cell, Place, View};
+use glam::DVec2;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
@@ -29,7 +30,7 @@ mod tests;
 const NONE: u32 = u32::MAX;
 
 /// How far beyond the last frame's border priorities enter the queues at first.
-const BAND: f32 = 1.01;
+const BAND: f32 = 1.004;
 
 /// A diamond of which there is a triangle, or that is split: a cache line.
 #[derive(Clone, Copy, Debug)]
@@ -208,6 +209,33 @@ impl<'a> RoamFlight<'a> {
     /// Diamonds split and merged since the flight was made; nearly all of them make four triangles of two, or two of four.
     pub fn operations(&self) -> (u64, u64) {
         self.operations
+    }
+
+    /// The corners of the triangle over or under a place, found in as many steps as the bintree is deep there; `None` where nothing is drawn.
+    pub fn triangle_at(&self, place: Place) -> Option<[Vertex; 3]> {
+        let inside = place.uv.cmpge(DVec2::ZERO).all() && place.uv.cmple(DVec2::ONE).all();
+        if self.records.is_empty() || !inside {
+            return None;
+        }
+        let point = place.uv * f64::from(STEPS);
+        let at = |p: Point| DVec2::new(f64::from(p[0]), f64::from(p[1]));
+        // The root is the first record; its first triangle lies to the south-east.
+        let (mut record, mut side) = (0, usize::from(point.y > point.x));
+        loop {
+            let known = &self.records[record];
+            if !known.split {
+                let triangle = self.mesh.triangles.get(known.triangles[side] as usize)?;
+                return Some(triangle.map(|vertex| self.mesh.vertices[vertex as usize]));
+            }
+            let diamond = Diamond::at(known.at);
+            let (middle, apex) = (at(diamond.at), diamond.apexes()[side]?);
+            let [a, b] = diamond.ends();
+            let end = if (point - middle).dot(at(a) - middle) >= 0.0 { a } else { b };
+            let child = [0, 1].map(|i| (end[i] + apex[i]) / 2);
+            let index = diamond.children().iter().position(|c| c.is_some_and(|c| c.at == child))?;
+            record = known.children[index] as usize;
+            side = usize::from(Diamond::at(child).apexes()[0] != Some(diamond.at));
+        }
     }
 
     /// Forgets the mesh.
@@ -573,9 +601,7 @@ impl<'a> RoamFlight<'a> {
     /// Whether a key is still true.
     fn valid(&self, key: &Key, list: u8) -> bool {
         let known = &self.records[key.record as usize];
-        known.list == list
-            && known.at == key.at()
-            && self.list.priority[known.place as usize].to_bits() == key.priority
+        known.list == list && known.at == key.at() && self.list.priority[known.place as usize].to_bits() == key.priority
     }
 
     /// Makes the band wider and takes what it holds into the queues.
@@ -663,7 +689,8 @@ impl<'a> RoamFlight<'a> {
                     None if self.band.1 == f32::INFINITY => break,
                     None => {
                         wider *= wider;
-                        let high = if wider.is_finite() { self.band.1.max(f32::MIN_POSITIVE) * wider } else { f32::INFINITY };
+                        let high =
+                            if wider.is_finite() { self.band.1.max(f32::MIN_POSITIVE) * wider } else { f32::INFINITY };
                         self.widen(self.band.0, high);
                     }
                 }

@@ -41,7 +41,13 @@ pub(super) struct Lens {
 
 impl Lens {
     /// The lens of a view of a face cut into `steps` steps a side.
-    pub(super) fn new(metric: &ScreenMetric, datum: Datum, steps: f64, heights: (f32, f32), priority: Priority) -> Lens {
+    pub(super) fn new(
+        metric: &ScreenMetric,
+        datum: Datum,
+        steps: f64,
+        heights: (f32, f32),
+        priority: Priority,
+    ) -> Lens {
         let (forward, sides, focal, stretch) = metric.lens();
         let (origin, size) = match datum {
             Datum::Plane { origin, size } => (origin, size),

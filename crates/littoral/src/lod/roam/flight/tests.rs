@@ -36,7 +36,11 @@ fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
             split.insert(diamond.name());
             let before = leaves.len();
             leaves.retain(|(d, _)| *d != diamond);
-            assert_eq!(before - leaves.len(), diamond.apexes().into_iter().flatten().count(), "both of its triangles are there");
+            assert_eq!(
+                before - leaves.len(),
+                diamond.apexes().into_iter().flatten().count(),
+                "both of its triangles are there"
+            );
             for child in diamond.children().into_iter().flatten() {
                 let side = child.apexes().iter().position(|apex| *apex == Some(diamond.at)).expect("a parent");
                 leaves.push((child, side));
@@ -46,6 +50,30 @@ fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
     let worst = leaves.iter().map(|(d, _)| number(*d)).fold(0.0, f32::max);
     let drawn = leaves.into_iter().filter(|(d, side)| flight.bounds.bound(*d).whole(*side));
     (drawn.map(|(d, side)| turned(d.triangle(d.apexes()[side].expect("there")))).collect(), worst)
+}
+
+/// Whether no diamond has a greater priority than those that must be split before it.
+fn nested(flight: &RoamFlight) -> bool {
+    let lens = flight.lens.as_ref().expect("a view was seen");
+    let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
+    let finest = flight.bounds.finest();
+    let mut level = vec![Diamond::ROOT];
+    while !level.is_empty() {
+        let mut next = Vec::new();
+        for diamond in level {
+            let children = diamond.children().into_iter().flatten();
+            for child in children.filter(|c| c.cell_level() < finest || c.cell_level() == finest && c.is_square()) {
+                if number(child) > number(diamond) {
+                    return false;
+                }
+                if child.apexes()[0] == Some(diamond.at) && child.cell_level() < finest {
+                    next.push(child);
+                }
+            }
+        }
+        level = next;
+    }
+    true
 }
 
 /// A triangle beginning with its least corner.
@@ -112,20 +140,19 @@ proptest! {
             let before = (split_set(&flight), flight.operations());
             let reached = flight.update(&view, &mut || false).expect("a view");
             let (triangles, worst) = algorithm_one(&flight);
-            let lens = flight.lens.as_ref().expect("a view was seen");
-            let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
-            let mut level = vec![Diamond::ROOT];
-            while !level.is_empty() {
-                let mut next = Vec::new();
-                for diamond in level {
-                    for child in diamond.children().into_iter().flatten().filter(|c| c.cell_level() < bounds.finest() || c.cell_level() == bounds.finest() && c.is_square()) {
-                        prop_assert!(number(child) <= number(diamond), "{:?} {} {:?} in {:?} {} {:?}", child, number(child), bounds.bound(child), diamond, number(diamond), bounds.bound(diamond));
-                        if child.apexes()[0] == Some(diamond.at) && child.cell_level() < bounds.finest() {
-                            next.push(child);
-                        }
-                    }
+            prop_assert!(nested(&flight));
+            for part in [DVec2::new(0.0, 0.0), DVec2::new(0.3, 0.1), DVec2::new(u.abs().fract(), v.abs().fract())] {
+                let place = Place { face: 0, uv: part };
+                let point = part * f64::from(STEPS);
+                let within = |t: &[Point; 3]| {
+                    let [a, b, c] = t.map(|p| DVec2::new(f64::from(p[0]), f64::from(p[1])));
+                    [(a, b), (b, c), (c, a)].into_iter().all(|(a, b)| (b - a).perp_dot(point - a) >= 0.0)
+                };
+                match flight.triangle_at(place) {
+                    Some(found) => prop_assert!(within(&found.map(|v| [v.x, v.y]))),
+                    // On an edge the triangle beyond may be void.
+                    None => prop_assert!(triangles.iter().filter(|t| within(t)).count() == 0 || part.x == 0.0),
                 }
-                level = next;
             }
             prop_assert_eq!(drawn(&flight), triangles);
             if reached.pixels.is_finite() {
@@ -140,4 +167,38 @@ proptest! {
             }
         }
     }
+}
+
+/// A frame that is stopped is whole, and no step is lost.
+#[test]
+fn stopped_frames_catch_up() {
+    let heights: Vec<f32> = (0..65 * 65).map(|i| ((i * 7919) % 101) as f32).collect();
+    let land = land(65, 65, &heights);
+    let bounds = NestedBounds::of(&land);
+    let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: 1_500 });
+    let look = |x: f64| {
+        let mut view =
+            View::looking_at(DVec3::new(x, -60.0, 130.0), DVec3::new(x, 20.0, 50.0), 1.0, UVec2::new(320, 200));
+        view.tolerance_pixels = 0.5;
+        view
+    };
+    flight.update(&look(-60.0), &mut || false).expect("a view");
+    let mut worst = f32::INFINITY;
+    for frame in 0..100 {
+        let mut asked = 0;
+        let mut stop = || {
+            asked += 1;
+            asked > 2
+        };
+        let reached = flight.update(&look(60.0), &mut stop).expect("a view");
+        assert!(flight.triangles() <= 1_500, "frame {frame}");
+        worst = reached.pixels;
+        if asked <= 2 {
+            break;
+        }
+        assert!(reached.limited && frame < 99, "it never ends");
+    }
+    let (triangles, best) = algorithm_one(&flight);
+    assert_eq!(drawn(&flight), triangles);
+    assert_eq!(worst, best);
 }
