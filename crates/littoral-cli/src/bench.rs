@@ -1,5 +1,7 @@
 //! `littoral bench`: how fast this version is on this machine.
 
+mod lod;
+
 use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::{Land, RangePyramid, Raster, noise::Fbm};
@@ -17,7 +19,8 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   littoral bench rays
-  littoral bench rays --size 1025 --json")]
+  littoral bench rays --size 1025 --json
+  littoral bench lod --tolerance 2")]
 pub struct Bench {
     #[command(subcommand)]
     what: What,
@@ -27,6 +30,8 @@ pub struct Bench {
 enum What {
     /// Rays, lines of sight, heights and a viewshed against mountains of 30 × 30 km
     Rays(Rays),
+    /// All methods of detail along the same flights: triangles, true error in pixels, popping, time
+    Lod(lod::Lod),
 }
 
 #[derive(clap::Args)]
@@ -41,6 +46,7 @@ impl Bench {
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
         match self.what {
             What::Rays(rays) => rays.run(talk),
+            What::Lod(lod) => lod.run(talk),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A height file as ground to stand on, in the file's coordinates and in local metres.
 
 use crate::talk::{Failure, Talk, progress, tidy};
-use glam::{DAffine2, DVec2};
+use glam::{DAffine2, DVec2, DVec3};
 use littoral::field::{Land, Raster, Window};
 use littoral_data::{Code, Crs, Dem, Encoding, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
 use std::path::{Path, PathBuf};
@@ -121,17 +121,17 @@ impl Opened {
 
     /// A window of the file as land, at full resolution, in the local metres of the whole file. It may be all void.
     pub fn part(&mut self, window: Window, talk: &mut Talk) -> Result<Land, Failure> {
+        let raster = self.samples(window, talk)?;
+        Ok(Land::at(raster, self.frame.corner(window)))
+    }
+
+    /// The samples of a window of the file, at full resolution. They may be all void.
+    pub fn samples(&mut self, window: Window, talk: &mut Talk) -> Result<Raster, Failure> {
         let Window { columns, rows, .. } = window;
         let mut heights = self.source.read(0, window)?;
         self.pass_on(&self.info().warnings.clone(), talk);
-        let [flip_columns, flip_rows] = self.frame.georeference.flips();
         self.frame.georeference.turn(&mut heights, columns);
-        let raster =
-            Raster::new(columns, rows, self.frame.spacing(), heights).map_err(|e| self.failure(&e.to_string()))?;
-        let column = if flip_columns { window.column + columns - 1 } else { window.column };
-        let row = if flip_rows { window.row + rows - 1 } else { window.row };
-        let corner = self.frame.local_from_sample.transform_point2(DVec2::new(column as f64, row as f64));
-        Ok(Land::at(raster, corner))
+        Raster::new(columns, rows, self.frame.spacing(), heights).map_err(|e| self.failure(&e.to_string()))
     }
 
     /// The file as land at a resolution of at most so many samples, and the frame of that.
@@ -158,6 +158,23 @@ impl Opened {
         let high = (high.ceil() + 1.0).max(low + 1.0).min(last);
         let size = high - low + 1.0;
         Window { column: low.x as usize, row: low.y as usize, columns: size.x as usize, rows: size.y as usize }
+    }
+
+    /// The window of all samples in the rectangle between two local positions; `None` if there are not 2 × 2.
+    pub fn samples_between(&self, a: DVec2, b: DVec2) -> Option<Window> {
+        /// As much of a cell as typed decimals may leave a corner off its sample.
+        const SLACK: f64 = 1e-6;
+        let samples = self.frame.local_from_sample.inverse();
+        let (a, b) = (samples.transform_point2(a), samples.transform_point2(b));
+        let low = (a.min(b) - SLACK).ceil().max(DVec2::ZERO);
+        let high = (a.max(b) + SLACK).floor().min(self.frame.last());
+        let size = high - low + 1.0;
+        (size.min_element() >= 2.0).then_some(Window {
+            column: low.x as usize,
+            row: low.y as usize,
+            columns: size.x as usize,
+            rows: size.y as usize,
+        })
     }
 
     /// A failure with the file's name.
@@ -254,6 +271,55 @@ impl Frame {
     /// The file's coordinates of local metres.
     pub fn crs(&self, local: DVec2) -> DVec2 {
         self.crs_from_local.transform_point2(local)
+    }
+
+    /// The local position (m) of the south-western sample of a window of the file.
+    pub fn corner(&self, window: Window) -> DVec2 {
+        self.local_from_sample.transform_point2(self.first_sample(window))
+    }
+
+    /// Column and row in the file of a window's south-western sample.
+    fn first_sample(&self, window: Window) -> DVec2 {
+        let [columns, rows] = self.georeference.flips();
+        let column = if columns { window.column + window.columns - 1 } else { window.column };
+        let row = if rows { window.row + window.rows - 1 } else { window.row };
+        DVec2::new(column as f64, row as f64)
+    }
+
+    /// The file's coordinates of column and row of a window's samples, counted from its south-western one.
+    pub fn crs_from_lattice(&self, window: Window) -> DAffine2 {
+        let [columns, rows] = self.georeference.flips().map(|against| if against { -1.0 } else { 1.0 });
+        let first = self.first_sample(window);
+        let sample_from_lattice = DAffine2::from_scale_angle_translation(DVec2::new(columns, rows), 0.0, first);
+        self.georeference.crs_from_sample() * sample_from_lattice
+    }
+
+    /// The window of the file that holds a part of another one; the part's columns and rows count from that one's
+    /// south-western sample.
+    pub fn within(&self, outer: Window, part: Window) -> Window {
+        let [columns, rows] = self.georeference.flips();
+        let along = |against: bool, first: usize, size: usize, part: usize, part_size: usize| match against {
+            true => first + size - part - part_size,
+            false => first + part,
+        };
+        Window {
+            column: along(columns, outer.column, outer.columns, part.column, part.columns),
+            row: along(rows, outer.row, outer.rows, part.row, part.rows),
+            ..part
+        }
+    }
+
+    /// Whether something says where the file lies: if not, its coordinates count pixels, southward.
+    pub fn is_placed(&self) -> bool {
+        !self.georeference.y_south
+    }
+
+    /// Replaces the file's coordinates X and Y by longitude and latitude (degrees).
+    pub fn to_lonlat(&self, positions: &mut [DVec3]) -> Result<(), String> {
+        let mut places: Vec<DVec2> = positions.iter().map(|at| at.truncate()).collect();
+        self.georeference.lonlats_from_crs(&mut places)?;
+        positions.iter_mut().zip(places).for_each(|(at, place)| *at = place.extend(at.z));
+        Ok(())
     }
 
     /// Whether a local position lies within the samples, but for rounding.

@@ -1,6 +1,6 @@
 //! What is typed: coordinates, sizes, angles.
 
-use glam::{DVec2, DVec3, UVec2};
+use glam::{DVec2, DVec3, DVec4, UVec2};
 use std::ffi::OsString;
 
 /// Lets negative numbers through: a parser takes `-155.2,19.4` for options. Arguments that can only be numbers get a
@@ -39,6 +39,11 @@ pub fn xy(text: &str) -> Result<DVec2, String> {
 /// `X,Y,Z` or `X,Y,H`.
 pub fn xyz(text: &str) -> Result<DVec3, String> {
     numbers::<3>(text, "three numbers X,Y,HEIGHT without spaces").map(DVec3::from)
+}
+
+/// `X,Y,X,Y`: two corners.
+pub fn window(text: &str) -> Result<DVec4, String> {
+    numbers::<4>(text, "two corners X,Y,X,Y without spaces").map(DVec4::from)
 }
 
 /// A position whose height may be left out.
@@ -94,6 +99,11 @@ pub fn factor(text: &str) -> Result<f64, String> {
 /// A positive number.
 pub fn positive(text: &str) -> Result<f64, String> {
     within(text, f64::MIN_POSITIVE, 1e12, "a number above 0")
+}
+
+/// A tolerance in pixels.
+pub fn tolerance(text: &str) -> Result<f64, String> {
+    within(text, 1e-3, 1e6, "0.001 to 1000000 pixels")
 }
 
 /// An instant in seconds.

@@ -1,14 +1,16 @@
-//! The `littoral` command: pictures, films and measurements of height fields.
+//! The `littoral` command: pictures, films, measurements and meshes of height fields.
 //!
 //! Results go to stdout, talk to stderr. `--json` prints one JSON object and nothing else. Exit 0 for success, 1 when
 //! the input or the work failed, 2 when the command line was wrong.
 
 mod bench;
+mod detail;
 mod film;
 mod ground;
 mod height;
 mod info;
 mod input;
+mod mesh;
 mod plot;
 mod points;
 mod profile;
@@ -23,7 +25,7 @@ use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use talk::{Failure, Talk};
 
-/// Pictures, films and measurements of land and sea from any height file.
+/// Pictures, films, measurements and meshes of land and sea from any height file.
 #[derive(Parser)]
 #[command(
     name = "littoral",
@@ -64,6 +66,7 @@ enum Command {
     Profile(profile::Profile),
     Sight(sight::Sight),
     Viewshed(viewshed::Viewshed),
+    Mesh(Box<mesh::Mesh>),
     Waves(waves::Waves),
     Bench(bench::Bench),
 }
@@ -103,6 +106,7 @@ fn main() -> ExitCode {
         Command::Profile(command) => command.run(&mut talk),
         Command::Sight(command) => command.run(&mut talk),
         Command::Viewshed(command) => command.run(&mut talk),
+        Command::Mesh(command) => command.run(&mut talk),
         Command::Waves(command) => command.run(&mut talk),
         Command::Bench(command) => command.run(&mut talk),
     };

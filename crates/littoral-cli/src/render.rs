@@ -1,5 +1,6 @@
 //! `littoral render`: pictures and films.
 
+use crate::detail::{Chosen, Detail, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
@@ -9,7 +10,9 @@ use crate::waves::state as sea;
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::{Sea, coast};
-use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
+use littoral::picture::{
+    self, Border, Climate, Display, Drape, Meshes, Picture, Scene, Settings, Shot, Stage, Sun, Texture,
+};
 use littoral::space::{Ray, View};
 use littoral::waves::SeaState;
 use littoral_data::write::{self, Layer, PngPixels};
@@ -34,6 +37,7 @@ use std::time::Instant;
   littoral render dem.tif --sea wind=14,from=300 --sun 300,8
   littoral render --sea beaufort=8,from=240                the coast in a storm
   littoral render --sea buoy=41010.data_spec               in the waves that a buoy measured
+  littoral render dem.tif --lod quadtree --tolerance 2 --wireframe      the mesh that a method of detail draws
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
   littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4
@@ -115,6 +119,9 @@ pub struct Render {
     #[arg(long, help_heading = "Quality")]
     full: bool,
 
+    #[command(flatten)]
+    detail: Detail,
+
     /// A film along a path: a path file, or orbit (also without a value) for once round the land
     #[arg(long, value_name = "FILE|orbit", num_args = 0..=1, default_missing_value = "orbit", help_heading = "Film")]
     path: Option<PathBuf>,
@@ -181,6 +188,9 @@ struct Answer {
     time: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     passes: Option<String>,
+    /// The mesh, if one was drawn.
+    #[serde(skip_serializing_if = "Option::is_none", flatten)]
+    mesh: Option<Told>,
 }
 
 impl Render {
@@ -220,9 +230,17 @@ impl Render {
             return film.run(&subject, &stage, sea.as_mut(), &settings, started, talk);
         }
 
+        let mesh_view = self.detail.view(&self, &subject, &shot.view, look, talk)?;
+        let chosen = self.detail.choose(stage.land(), sea.as_ref(), &mesh_view)?;
         let bar = progress(1000, "rendering");
-        let picture =
-            stage.render_sea(sea.as_ref(), &shot.view, &settings, &|done| bar.set_position((done * 1000.0) as u64));
+        let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
+        let picture = match &chosen {
+            Some(Chosen { ground, water, .. }) => {
+                let meshes = Meshes { ground: Some(ground), water: water.as_ref(), wireframe: self.detail.wireframe };
+                stage.render_meshes(&meshes, sea.as_ref(), &shot.view, &settings, &told)
+            }
+            None => stage.render_sea(sea.as_ref(), &shot.view, &settings, &told),
+        };
         bar.finish_and_clear();
         let passes = self.save(&picture, &out, &subject)?;
 
@@ -246,11 +264,12 @@ impl Render {
                 hs: sea.as_ref().map(|_| state.clone().unwrap_or_else(coast::sea_state).significant_height()),
                 time: sea.as_ref().map(Sea::time),
                 passes: passes.map(|p| p.display().to_string()),
+                mesh: chosen.map(|c| c.told),
             });
         }
         let also = passes.map_or(String::new(), |p| format!(" (passes in {})", p.display()));
         talk.print(format!(
-            "{}: {}x{} in {}{also}, --eye {} --look {} --fov {}, exaggeration {}, {}\n",
+            "{}: {}x{} in {}{also}, --eye {} --look {} --fov {}, exaggeration {}, {}{}\n",
             out.file.display(),
             self.size.x,
             self.size.y,
@@ -259,7 +278,8 @@ impl Render {
             subject.shown(look),
             tidy(shot.field.to_degrees(), 1),
             tidy(self.exaggeration, 2),
-            subject.datum
+            subject.datum,
+            chosen.map_or(String::new(), |c| c.told.line())
         ))
     }
 
@@ -417,7 +437,7 @@ impl Render {
         Ok((Framed { shot: Shot { view, sun, air, style, border }, field }, look))
     }
 
-    fn eye_position(&self, subject: &Subject, eye: DVec3, talk: &mut Talk) -> Result<DVec3, Failure> {
+    pub fn eye_position(&self, subject: &Subject, eye: DVec3, talk: &mut Talk) -> Result<DVec3, Failure> {
         let local = subject.local(System::of(self.lonlat), eye.truncate())?;
         let ground = subject.surface(local);
         let z = match (self.above, ground) {

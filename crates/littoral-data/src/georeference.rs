@@ -159,6 +159,24 @@ impl Georeference {
         }
     }
 
+    /// [`Georeference::lonlat_from_crs`] for many coordinates in place, longitudes being whole turns away from there where
+    /// this keeps them together: within half a turn of the raster's middle. Degrees stay as they are.
+    ///
+    /// # Errors
+    /// As [`Georeference::lonlat_from_crs`].
+    pub fn lonlats_from_crs(&self, places: &mut [DVec2]) -> Result<(), String> {
+        if matches!(self.crs, Crs::Geographic { .. }) {
+            return Ok(());
+        }
+        let projector = Projector::new(&self.crs)?;
+        let middle = projector.inverse(self.middle())?.x;
+        for place in places {
+            *place = projector.inverse(*place)?;
+            place.x -= 360.0 * ((place.x - middle) / 360.0).round();
+        }
+        Ok(())
+    }
+
     /// Distance between samples along columns and along rows (m), in the middle of the raster.
     pub fn spacing(&self) -> DVec2 {
         let metric = self.metric();

@@ -33,6 +33,8 @@ mod error;
 pub mod formats;
 mod georeference;
 mod image;
+#[cfg(feature = "lod")]
+pub mod lod;
 mod mosaic;
 pub mod path;
 mod reduce;

@@ -40,6 +40,14 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
                 );
             }
         }
+        for depth in [0, 1, 3] {
+            let mut finer = vec![cell];
+            for _ in 0..depth {
+                finer = finer.into_iter().flat_map(Cell::children).collect();
+            }
+            let most = finer.into_iter().map(|cell| field.error(cell)).fold(0.0, f32::max);
+            assert_eq!(field.stencil_error(cell, depth), most, "{cell:?}: {depth} levels below");
+        }
         let at = |u: f64, v: f64| Place { face: 0, uv: cell.low_corner().uv + DVec2::new(u, v) * cell.side() };
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|(u, v)| field.height(at(u, v)));
         let slack = corners.iter().flatten().fold(1.0f32, |m, h| m.max(h.abs())) * 8.0 * f32::EPSILON;

@@ -1,4 +1,4 @@
-//! Files out: pictures, grids and films, each written whole or not at all.
+//! Files out: pictures, grids, meshes and films, each written whole or not at all.
 //!
 //! Everything is written to a temporary file beside its destination, which takes the destination's name only when it is
 //! complete; whatever goes wrong before, an older file of that name stays as it was. A program that is interrupted calls
@@ -7,12 +7,14 @@
 mod exr;
 mod film;
 mod geotiff;
+mod mesh;
 mod png;
 
 pub use self::exr::{Layer, exr};
 pub use self::png::{PngPixels, png};
 pub use film::{Film, FilmSettings, FrameFolder, ffmpeg_installed};
 pub use geotiff::{GeoTags, GridSamples, geotiff};
+pub use mesh::{MeshFormat, mesh};
 
 use crate::Error;
 use std::io::{BufWriter, Seek, Write};

@@ -71,6 +71,30 @@ impl ErrorPyramid {
         }
     }
 
+    /// The greatest bound (m) of the cells `depth` levels below `cell`: see [`HeightField::stencil_error`](super::HeightField::stencil_error).
+    pub fn finer(&self, raster: &Raster, cell: Cell, depth: u8) -> f32 {
+        let Some(k) = self.finest.checked_sub(cell.level + depth).filter(|&k| k > 0) else {
+            // Patches, or parts of them.
+            let depth = depth.min(Cell::MAX_LEVEL - cell.level);
+            let patches = depth.min(self.finest.saturating_sub(cell.level));
+            let (side, scale) = (1u32 << patches, 1u32 << (depth - patches));
+            let level = cell.level + depth;
+            let indices = (0..side * side).map(|i| (i % side, i / side));
+            let finer = indices.map(|(i, j)| Cell {
+                level,
+                x: ((cell.x << patches) + i) * scale,
+                y: ((cell.y << patches) + j) * scale,
+                ..cell
+            });
+            return finer.fold(0.0, |most, cell| self.error(raster, cell).max(most));
+        };
+        let level = &self.levels[usize::from(k) - 1];
+        let (left, bottom) = ((cell.x as usize) << depth, (cell.y as usize) << depth);
+        let (right, top) = ((left + (1 << depth)).min(level.columns), (bottom + (1 << depth)).min(level.rows));
+        let lines = (bottom..top).filter(|_| left < right).map(|y| &level.bounds[y * level.columns..][left..right]);
+        lines.flatten().fold(0.0f32, |most, &bound| if bound > most { bound } else { most })
+    }
+
     /// Brings the bounds up to date after the samples of `window` changed. Cells too large to be measured anew keep a
     /// bound that holds but may be higher than a fresh build's.
     pub fn update(&mut self, raster: &Raster, window: Window) {

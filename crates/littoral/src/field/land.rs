@@ -200,4 +200,8 @@ impl HeightField for Land {
     fn error(&self, cell: Cell) -> f32 {
         self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest)).error(&self.raster, cell)
     }
+
+    fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {
+        self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest)).finer(&self.raster, cell, depth)
+    }
 }

@@ -75,6 +75,15 @@ pub trait HeightField: Sync {
     /// partly void, since no drawing of it is right; zero where there is no surface.
     fn error(&self, cell: Cell) -> f32;
 
+    /// Greatest error of the cells `depth` levels below `cell`: how wrong it is drawn in 2^`depth` × 2^`depth` cells. No deeper than
+    /// [`Cell::MAX_LEVEL`]. Overridden where bulk is faster.
+    fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {
+        if depth == 0 || cell.level == Cell::MAX_LEVEL {
+            return self.error(cell);
+        }
+        cell.children().into_iter().fold(0.0, |most, child| self.stencil_error(child, depth - 1).max(most))
+    }
+
     /// `side` × `side` heights over `cell`, its borders included, row by row from the south-west; NaN where void.
     ///
     /// # Panics

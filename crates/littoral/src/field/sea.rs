@@ -402,6 +402,12 @@ impl HeightField for Sea {
         error + 2.0 * Sea::TOLERANCE * b.slope.min(1.0) + 4e-7 * (self.level.abs() as f32 + b.height)
     }
 
+    fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {
+        // The same for all cells of a size.
+        let finer = depth.min(Cell::MAX_LEVEL - cell.level);
+        self.error(Cell { level: cell.level + finer, x: cell.x << finer, y: cell.y << finer, ..cell })
+    }
+
     fn heights(&self, places: &[Place], heights: &mut [f32]) {
         assert_eq!(places.len(), heights.len(), "expected as many heights as places");
         places.par_chunks(BLOCK).zip(heights.par_chunks_mut(BLOCK)).with_min_len(64).for_each(|(places, heights)| {

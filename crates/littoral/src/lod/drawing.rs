@@ -237,33 +237,62 @@ fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
             mesh.vertices.push(Vertex { x, y, face: patch.face.into(), height: drawn });
         }
     }
-    // Odd vertices of a side whose neighbour lacks them are replaced by the even ones before them.
+    // A cell exists only whole.
+    let whole =
+        |i: u32, j: u32| [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].iter().all(|&(i, j)| !height(i, j).is_nan());
+    // Odd vertices of a side whose neighbour lacks them are replaced by the even ones before them, so that of three triangles at the side two
+    // remain. Where one of the two cells there is missing, the vertex stays, and a triangle that stands upright closes the gap.
     let [south, east, north, west] = patch.edges.map(|edge| edge.coarser);
-    let kept = |i: u32, j: u32| {
-        let i = if (south && j == 0) || (north && j == n) { i & !1 } else { i };
-        let j = if (west && i == 0) || (east && i == n) { j & !1 } else { j };
-        j * side + i
+    let missing = |i: u32, j: u32| {
+        if i & 1 == 1 && ((south && j == 0) || (north && j == n)) {
+            let row = if j == 0 { 0 } else { n - 1 };
+            Some([(i - 1, row), (i, row)])
+        } else if j & 1 == 1 && ((west && i == 0) || (east && i == n)) {
+            let column = if i == 0 { 0 } else { n - 1 };
+            Some([(column, j - 1), (column, j)])
+        } else {
+            None
+        }
+    };
+    let kept = |i: u32, j: u32| match missing(i, j) {
+        Some(cells) if cells.iter().all(|&(i, j)| whole(i, j)) => {
+            let (before, _) = coarse_ends(i, j);
+            before.1 * side + before.0
+        }
+        _ => j * side + i,
     };
     let mut push = |corners: [u32; 3]| {
         let [a, b, c] = corners;
-        if a != b && b != c && c != a && corners.iter().all(|&v| !heights[v as usize].is_nan()) {
+        if a != b && b != c && c != a {
             mesh.triangles.push(corners.map(|v| base + v));
         }
     };
     for j in 0..n {
         for i in 0..n {
-            let [a, b, c, d] = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].map(|(i, j)| kept(i, j));
-            // A cell exists only whole.
-            let voids = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].iter().any(|&(i, j)| height(i, j).is_nan());
-            if voids {
+            if !whole(i, j) {
                 continue;
             }
+            let [a, b, c, d] = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].map(|(i, j)| kept(i, j));
             if (i + j) & 1 == 0 {
                 push([a, b, d]);
                 push([a, d, c]);
             } else {
                 push([a, b, c]);
                 push([b, d, c]);
+            }
+        }
+    }
+    if south || east || north || west {
+        for k in (1..n).step_by(2) {
+            // Each side, run along with the patch on the left.
+            for (i, j, turned) in [(k, 0, false), (n, k, false), (k, n, true), (0, k, true)] {
+                let Some(cells) = missing(i, j) else { continue };
+                let (one, other) = coarse_ends(i, j);
+                let ends = [one, other].map(|(i, j)| (!height(i, j).is_nan()).then_some(j * side + i));
+                if let ([Some(one), Some(other)], 1) = (ends, cells.iter().filter(|&&(i, j)| whole(i, j)).count()) {
+                    let (from, to) = if turned { (other, one) } else { (one, other) };
+                    push([from, to, j * side + i]);
+                }
             }
         }
     }

@@ -1,8 +1,9 @@
 //! Level of detail: which triangles are worth their cost in this view.
 //!
 //! A method ([`Lod`]) is shown a height field and a view and fills a [`Drawing`]. All methods keep the same promises, which one suite asks of
-//! each (`tests/lod.rs`): what the view sees of the surface is covered exactly once and without cracks, no sample of it is drawn farther from its
+//! each (`tests/lod`): what the view sees of the surface is covered exactly once and without cracks, no sample of it is drawn farther from its
 //! place than the view tolerates, and where a limit forbids that, the bound that was reached is told. They differ in what they spend on it.
+//! Voids are never bridged: what is partly void is refined until it is whole or nothing, or too small to matter, and then left out.
 //!
 //! A drawing has two forms. Most methods put out *patches*: affine images of one stencil, which a GPU draws as instances. Others keep a mesh of
 //! their own. [`Drawing::expand`] turns patches into the second form, so that whoever wants triangles finds one thing.
@@ -12,11 +13,17 @@
 
 mod drawing;
 mod metric;
+mod nested;
+mod patches;
+mod quadtree;
 mod roam;
 mod whole;
 
 pub use drawing::{Drawing, Edge, Mesh, Patch, Stencil, Vertex};
 pub use metric::{Bounds, ScreenMetric, ViewError};
+pub use nested::{Nested, Seams};
+pub use patches::Patches;
+pub use quadtree::Quadtree;
 pub use roam::{NestedBounds, Priority, Roam, RoamFlight};
 pub use whole::Whole;
 
@@ -37,7 +44,8 @@ pub trait Lod {
 /// What a method attained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// No sample that is seen is drawn farther from its place than this (pixels). Infinite where a limit left void ground unresolved.
+    /// No sample that is seen is drawn farther from its place than this (pixels). What is partly void and was
+    /// left out counts with its size.
     pub pixels: f32,
     /// Whether a limit, not the tolerance, ended the refinement.
     pub limited: bool,

@@ -54,7 +54,9 @@ impl Lod for Whole {
             self.next.extend(self.cells.iter().flat_map(|cell| cell.children()));
             std::mem::swap(&mut self.cells, &mut self.next);
         }
-        drawing.patches.extend(self.cells.iter().map(|&cell| Patch::of(cell)));
+        // No void is bridged: what is partly void is left out.
+        let whole = self.cells.iter().filter(|&&cell| field.error(cell).is_finite());
+        drawing.patches.extend(whole.map(|&cell| Patch::of(cell)));
         Ok(reached)
     }
 }

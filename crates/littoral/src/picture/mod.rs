@@ -20,6 +20,7 @@ mod block;
 mod cartography;
 mod compose;
 mod display;
+mod drawn;
 mod grain;
 mod ground;
 mod natural;
@@ -36,6 +37,7 @@ mod waves;
 
 pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
 pub use display::{Display, Exposure, Medium, Picture};
+pub use drawn::{Meshes, mesh_errors};
 pub use stage::Stage;
 pub use texture::{Drape, Texture};
 

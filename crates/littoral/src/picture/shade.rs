@@ -240,6 +240,13 @@ impl Stage<'_> {
         if facet.sunlit != Vec3::ZERO {
             let lift = 0.02 * self.ground.spacing() + 1.5e-4 * distance;
             shaded.sunlit = facet.sunlit;
+            let mut position = position;
+            if !lens.caster.is_exact()
+                && let Some(exact) = self.ground.land.height_at(position.truncate())
+            {
+                // The exact ground casts the shadows: a mesh that dips below it would lie in its own.
+                position.z = position.z.max(f64::from(exact));
+            }
             let origin = (position - lens.eye).as_vec3() + facet.smooth * lift;
             shaded.shadow = Some(LocalRay::new(origin, self.to_sun(pattern, index)));
         }

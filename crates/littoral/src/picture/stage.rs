@@ -3,6 +3,7 @@
 use super::atmosphere::{Atmosphere, EARTH, Sky};
 use super::block::{MIST, Wall};
 use super::cartography::Tints;
+use super::drawn::Drawn;
 use super::ground::Ground;
 use super::rim::Rim;
 use super::sampler::Patterns;
@@ -46,6 +47,10 @@ pub(super) trait Caster: Sync {
     fn first_hits(&self, rays: &[LocalRay], distances: &mut [f32]);
     /// Whether anything is hit.
     fn any_hits(&self, rays: &[LocalRay], hits: &mut [bool]);
+    /// Whether rays from the eye meet the exact ground, and not a mesh that may lie below it.
+    fn is_exact(&self) -> bool {
+        true
+    }
 }
 
 impl Caster for RayCaster<'_> {
@@ -69,6 +74,8 @@ pub(super) struct Lens<'a> {
     pub caster: &'a dyn Caster,
     /// The waves on the water.
     pub sea: Option<&'a Sea>,
+    /// A mesh that stands for their surface.
+    pub water: Option<&'a Drawn>,
 }
 
 impl<'a> Stage<'a> {
@@ -117,7 +124,7 @@ impl<'a> Stage<'a> {
 
     /// What `view` sees. `progress` is told the fraction done, now and then, from any thread.
     pub fn render(&self, view: &View, settings: &Settings, progress: &(dyn Fn(f32) + Sync)) -> Picture {
-        self.render_with(&self.ground.land.caster(view.eye), self.scene.sea, view, settings, progress)
+        self.render_with(&self.ground.land.caster(view.eye), None, self.scene.sea, view, settings, progress)
     }
 
     /// What `view` sees with other waves than the scene's: a film takes the sea of each moment.
@@ -128,13 +135,14 @@ impl<'a> Stage<'a> {
         settings: &Settings,
         progress: &(dyn Fn(f32) + Sync),
     ) -> Picture {
-        self.render_with(&self.ground.land.caster(view.eye), sea, view, settings, progress)
+        self.render_with(&self.ground.land.caster(view.eye), None, sea, view, settings, progress)
     }
 
-    /// What `view` sees by the rays of some caster.
+    /// What `view` sees by the rays of some caster, and by a mesh of the sea.
     pub(super) fn render_with(
         &self,
         caster: &dyn Caster,
+        water: Option<&Drawn>,
         sea: Option<&Sea>,
         view: &View,
         settings: &Settings,
@@ -146,6 +154,7 @@ impl<'a> Stage<'a> {
             pixel: 1.0 / view.pixels_per_radian,
             caster,
             sea: sea.filter(|_| self.scene.water.is_some() && !self.is_map()),
+            water,
         };
         // Not by whoever of the tiles asks first: the flood is parallel, and a tile that it lets in meanwhile would wait for itself.
         if let (Some(water), Some(_), None) = (self.scene.water, lens.sea, self.beach.get()) {

@@ -192,7 +192,11 @@ impl Stage<'_> {
         let trace = |wanted: &[usize], wet: &mut [Option<Wet>]| {
             let rays: Vec<LocalRay> = wanted.iter().map(|&k| rays[k]).collect();
             let grounds: Vec<f32> = wanted.iter().map(|&k| distances[k]).collect();
-            for (&k, found) in wanted.iter().zip(self.wet(lens, sea, &rays, &grounds)) {
+            let mut found = self.wet(lens, sea, &rays, &grounds);
+            if let Some(mesh) = lens.water {
+                self.wet_mesh(lens, sea, mesh, &rays, &grounds, &mut found);
+            }
+            for (&k, found) in wanted.iter().zip(found) {
                 wet[k] = found.filter(|w| there(w.position.truncate()));
             }
         };
@@ -332,7 +336,7 @@ mod tests {
             let settings = Settings { samples: 6, seed, passes: true };
             let by = |cast| {
                 let caster = OneByOne { land: &stage.ground.land, eye, cast };
-                stage.render_with(&caster, None, &view, &settings, &|_| {})
+                stage.render_with(&caster, None, None, &view, &settings, &|_| {})
             };
             let (pyramid, patches) = (by(Land::first_hit), by(Land::first_hit_patch_by_patch));
             assert!(bits(&pyramid) == bits(&patches), "seed {seed}: the pyramid changes the picture");

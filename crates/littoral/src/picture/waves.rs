@@ -5,10 +5,11 @@
 //! narrower than what a pixel covers are left to the shading, as slopes.
 
 use super::atmosphere::EARTH;
+use super::drawn::Drawn;
 use super::grain::{grain, resolved};
 use super::sea::Ripples;
 use super::stage::{Lens, Stage};
-use crate::field::Sea;
+use crate::field::{HeightField, Sea, Surface};
 use crate::raycast::LocalRay;
 use crate::waves::{BLOCK, Motion, Points};
 use glam::{DVec2, DVec3, Vec2, Vec3};
@@ -223,6 +224,40 @@ impl Stage<'_> {
             Some(wet)
         };
         (0..rays.len()).map(wet).collect()
+    }
+
+    /// Replaces what rays met of the sea, where a mesh stands for it, by the mesh with the slopes of the water there.
+    pub(super) fn wet_mesh(
+        &self,
+        lens: &Lens,
+        sea: &Sea,
+        mesh: &Drawn,
+        rays: &[LocalRay],
+        grounds: &[f32],
+        found: &mut [Option<Wet>],
+    ) {
+        let mut distances = vec![f32::INFINITY; rays.len()];
+        mesh.first_hits(rays, &mut distances);
+        let datum = sea.datum();
+        let covered = |at: DVec2| {
+            let uv = datum.place(at.extend(0.0)).0.uv;
+            uv.cmpge(DVec2::ZERO).all() && uv.cmple(DVec2::ONE).all()
+        };
+        for (k, wet) in found.iter_mut().enumerate() {
+            let (direction, distance) = (rays[k].direction, distances[k]);
+            if distance <= grounds[k] * (1.0 + 1e-6) && distance.is_finite() {
+                let position = lens.eye + direction.as_dvec3() * f64::from(distance);
+                let mut points = Points::at(position.x, position.y);
+                points.footprint.fill(self.footprint(lens, distance, -direction.z));
+                let surface = sea.surface(&sea.find(&points, None, FINE), 0);
+                let Surface { slope, hidden, foam, rest, .. } = surface;
+                let mut there = Wet { position, slope, hidden, foam, rest };
+                shiver(sea, &mut there, points.footprint[0]);
+                *wet = Some(there);
+            } else if wet.is_some_and(|w| covered(w.position.truncate())) {
+                *wet = None;
+            }
+        }
     }
 
     /// Heights of the waves above still water where lanes are, by one step of the search for the water that is there.

@@ -14,7 +14,7 @@ pub struct Place {
 /// A square of a face's quadtree: the face divided into 2^`level` × 2^`level` cells.
 ///
 /// A value, not a reference: integers say *which*, exactly, so that neighbours agree to the bit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Cell {
     /// Which face: always 0 on a plane, 0 to 5 on an ellipsoid.
     pub face: u8,

@@ -1,6 +1,7 @@
 //! The conformance suite of [`Lod`]: what the trait promises, asked of every method.
 //!
-//! A new method joins by one line in `METHODS`. `LITTORAL_CASES` says how many random cases each method gets (default 60).
+//! A new method joins by one line in `METHODS`. `LITTORAL_CASES` says how many random cases each method gets (default 60),
+//! `LITTORAL_FIRST` the first seed.
 
 #![allow(missing_docs)]
 
@@ -12,7 +13,7 @@ use check::{Case, check};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::{Fbm, NoiseField};
 use littoral::field::{HeightField, Land, Raster, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Roam, ViewError, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Roam, Seams, ViewError, Whole};
 use littoral::space::{Datum, View};
 use littoral::waves::{SeaState, Superposition};
 
@@ -45,8 +46,19 @@ pub struct Method {
 /// Every method there is.
 pub const METHODS: &[Method] = &[
     Method { name: "whole", make: |limits| Box::new(Whole::new(limits)) },
+    Method { name: "nested", make: |limits| nested(limits, Seams::Strips) },
+    Method { name: "nested, morphing", make: |limits| nested(limits, Seams::Morphing) },
+    Method { name: "quadtree", make: |limits| Box::new(Quadtree::new(limits)) },
+    Method { name: "patches", make: |limits| Box::new(Patches::new(limits)) },
     Method { name: "roam", make: |limits| Box::new(Roam::new(limits)) },
 ];
+
+/// Nested grids of few cells.
+fn nested(limits: Limits, seams: Seams) -> Box<dyn Lod> {
+    let mut lod = Nested::new(limits);
+    (lod.cells, lod.seams) = (8, seams);
+    Box::new(lod)
+}
 
 /// Ground, invented ground or sea, and the finest level worth drawing.
 pub struct Surface {
@@ -150,16 +162,18 @@ pub fn random_view(surface: &Surface, random: &mut Random) -> View {
     view
 }
 
-/// How many random cases each method gets.
-pub fn cases() -> u64 {
-    std::env::var("LITTORAL_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(60)
+/// The seeds of the random cases that each method gets.
+pub fn cases() -> std::ops::Range<u64> {
+    let number = |name| std::env::var(name).ok().and_then(|n| n.parse().ok());
+    let first = number("LITTORAL_FIRST").unwrap_or(0);
+    first..first + number("LITTORAL_CASES").unwrap_or(60)
 }
 
 #[test]
 fn random_views_of_random_surfaces() {
     use rayon::prelude::*;
     for method in METHODS {
-        (0..cases()).into_par_iter().for_each(|seed| {
+        cases().into_par_iter().for_each(|seed| {
             let mut random = Random::new(seed);
             let surface = random_surface(&mut random);
             let finest = surface.finest + random.below(3) as u8;

@@ -22,7 +22,7 @@ impl Lod for Fixed<'_> {
 #[test]
 fn flights_over_prepared_land_keep_every_promise() {
     use rayon::prelude::*;
-    (0..cases()).into_par_iter().for_each(|seed| {
+    cases().into_par_iter().for_each(|seed| {
         let mut random = Random::new(seed + 1_000_000);
         let small = random.below(4) == 0;
         let mut side = || 2 + random.below(if small { 3 } else { 70 }) as usize;

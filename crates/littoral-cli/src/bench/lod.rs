@@ -1,0 +1,270 @@
+//! `littoral bench lod`: all methods of detail along the same flights.
+
+use super::mountains;
+use crate::detail::Method;
+use crate::talk::{Failure, Talk, progress, tidy};
+use clap::ValueEnum;
+use glam::{DVec2, DVec3, UVec2};
+use littoral::field::{HeightField, Land, Sea, coast};
+use littoral::lod::{Drawing, Limits, Mesh};
+use littoral::picture::mesh_errors;
+use littoral::space::{Datum, View};
+use littoral::waves::Superposition;
+use serde::Serialize;
+use std::time::Instant;
+
+#[derive(clap::Args)]
+pub struct Lod {
+    /// Samples along a side of the mountains
+    #[arg(long, default_value = "4097", value_parser = clap::value_parser!(u32).range(65..=16_385))]
+    size: u32,
+    /// How far from its place a mesh may be drawn, in pixels
+    #[arg(long, value_name = "PIXELS", value_parser = crate::input::tolerance, default_value = "1")]
+    tolerance: f64,
+    /// The most triangles
+    #[arg(long, value_name = "N", default_value = "1000000", value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
+    triangles: u32,
+    /// Frames of each flight, at 60 a second
+    #[arg(long, value_name = "N", default_value = "60", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    frames: u32,
+}
+
+/// The picture that tolerances count in.
+const FRAME: UVec2 = UVec2::new(1280, 720);
+/// Frames whose errors are measured, of each flight.
+const MEASURED: u32 = 4;
+
+/// A surface and how a camera moves over it.
+struct Flight<'a> {
+    name: &'static str,
+    field: &'a dyn HeightField,
+    finest: u8,
+    /// Eye and target at an instant (s).
+    camera: Box<dyn Fn(f64) -> (DVec3, DVec3) + 'a>,
+}
+
+#[derive(Serialize)]
+struct Answer {
+    frame: [u32; 2],
+    tolerance_pixels: f64,
+    most_triangles: u32,
+    flights: Vec<Row>,
+}
+
+/// One method on one flight.
+#[derive(Serialize)]
+struct Row {
+    flight: &'static str,
+    method: String,
+    triangles: usize,
+    vertices: usize,
+    bound_pixels: f32,
+    error_max_pixels: f32,
+    error_99_pixels: f32,
+    error_mean_pixels: f32,
+    pop_pixels: f32,
+    select_ms: f64,
+    select_99_ms: f64,
+    mesh_ms: f64,
+    mesh_mb: f64,
+}
+
+impl Lod {
+    /// Runs the measurement.
+    pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
+        let (mountains, coast) = (mountains(self.size), coast::coast());
+        let datum = Datum::Plane { origin: DVec2::splat(-1500.0), size: DVec2::splat(3000.0) };
+        // The sea of 2009: 16 frequencies in 8 directions.
+        let waves = Superposition::of_state(&coast::sea_state(), 16, 8)
+            .map_err(|e| Failure::Work(format!("the sea of the measurement: {e}")))?;
+        let sea = Sea::new(datum, 0.0).with(Box::new(waves));
+        let flights = flights(&mountains, &coast, &sea);
+        let bar = progress((flights.len() * Method::value_variants().len()) as u64, "flying");
+        let mut rows = Vec::new();
+        for flight in &flights {
+            for &method in Method::value_variants() {
+                rows.push(self.fly(flight, method)?);
+                bar.inc(1);
+            }
+        }
+        bar.finish_and_clear();
+        let answer = Answer {
+            frame: FRAME.to_array(),
+            tolerance_pixels: self.tolerance,
+            most_triangles: self.triangles,
+            flights: rows,
+        };
+        if talk.json() { talk.print_json(answer) } else { talk.print(answer.table()) }
+    }
+
+    fn fly(&self, flight: &Flight, method: Method) -> Result<Row, Failure> {
+        let mut lod = method.within(Limits { finest: flight.finest, triangles: self.triangles as usize });
+        let mut drawing = Drawing::default();
+        let (mut select, mut expand) = (Vec::new(), Vec::new());
+        let (mut triangles, mut vertices) = (Vec::new(), Vec::new());
+        let (mut bound, mut pop) = (0.0f32, 0.0f32);
+        let mut errors: Vec<f32> = Vec::new();
+        let mut before = Mesh::default();
+        for frame in 0..self.frames {
+            let (eye, target) = (flight.camera)(f64::from(frame) / 60.0);
+            let view = View {
+                tolerance_pixels: self.tolerance as f32,
+                ..View::looking_at(eye, target, 50f32.to_radians(), FRAME)
+            };
+            let start = Instant::now();
+            let reached = lod.select(flight.field, &view, &mut drawing).map_err(|e| Failure::Work(e.to_string()))?;
+            let chosen = Instant::now();
+            drawing.expand(flight.field);
+            select.push((chosen - start).as_secs_f64() * 1e3);
+            expand.push(chosen.elapsed().as_secs_f64() * 1e3);
+            triangles.push(drawing.mesh.triangles.len());
+            vertices.push(drawing.mesh.vertices.len());
+            bound = bound.max(reached.pixels);
+            let stride = (self.frames / MEASURED).max(1);
+            if frame % stride == 1 % stride {
+                // Both meshes from the same eye: what moves is the change of mesh alone.
+                let now = mesh_errors(&drawing.mesh, flight.field, &view);
+                let then = mesh_errors(&before, flight.field, &view);
+                let jumps = now.iter().zip(&then).map(|(now, then)| (now - then).abs());
+                pop = jumps.fold(pop, f32::max);
+                errors.extend(now.iter().filter(|e| !e.is_nan()).map(|e| e.abs()));
+            } else if (frame + 1) % stride == 1 % stride {
+                before.clone_from(&drawing.mesh);
+            }
+        }
+        errors.sort_by(f32::total_cmp);
+        [&mut select, &mut expand].into_iter().for_each(|times| times.sort_by(f64::total_cmp));
+        triangles.sort_unstable();
+        vertices.sort_unstable();
+        let at = |share: f64, count: usize| ((count as f64 * share) as usize).min(count.saturating_sub(1));
+        let error = |share: f64| errors.get(at(share, errors.len())).copied().unwrap_or(f32::NAN);
+        let (half, vertex_count) = (at(0.5, select.len()), vertices[at(0.5, vertices.len())]);
+        let triangle_count = triangles[at(0.5, triangles.len())];
+        Ok(Row {
+            flight: flight.name,
+            method: format!("{method:?}").to_lowercase(),
+            triangles: triangle_count,
+            vertices: vertex_count,
+            bound_pixels: bound,
+            error_max_pixels: error(1.0),
+            error_99_pixels: error(0.99),
+            error_mean_pixels: errors.iter().map(|&e| f64::from(e)).sum::<f64>() as f32 / errors.len().max(1) as f32,
+            pop_pixels: pop,
+            select_ms: select[half],
+            select_99_ms: select[at(0.99, select.len())],
+            mesh_ms: expand[half],
+            mesh_mb: (vertex_count * 16 + triangle_count * 12) as f64 / 1e6,
+        })
+    }
+}
+
+/// Low over mountains, high above them, along the coast, and over the open sea.
+fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea) -> Vec<Flight<'a>> {
+    let ground = |land: &Land, at: DVec2| f64::from(land.height_at(at).unwrap_or(0.0)).max(0.0);
+    let over = move |land: &'a Land, from: DVec2, to: DVec2, speed: f64, above: f64, down: f64| {
+        let ahead = (to - from).normalize();
+        // A pilot looks ahead: the height changes with the land of a kilometre.
+        let height = move |at: DVec2| {
+            (-4..=4).map(|i| ground(land, at + ahead * (f64::from(i) * 125.0))).fold(0.0, f64::max) + above
+        };
+        move |t: f64| {
+            let at = from + ahead * (speed * t);
+            let eye = at.extend(height(from) + t * (height(to) - height(from)) * speed / from.distance(to));
+            (eye, eye + ahead.extend(-down) * 1000.0)
+        }
+    };
+    let (low, extent) = (mountains.origin(), mountains.extent());
+    let finest = mountains.finest_level();
+    let (south, size) = (coast.origin(), coast.extent());
+    vec![
+        Flight {
+            name: "low over mountains, 100 m/s",
+            field: mountains,
+            finest,
+            camera: Box::new(over(
+                mountains,
+                low + extent * 0.3,
+                low + extent * DVec2::new(0.35, 0.33),
+                100.0,
+                150.0,
+                0.1,
+            )),
+        },
+        Flight {
+            name: "high above them, 250 m/s",
+            field: mountains,
+            finest,
+            camera: Box::new(over(
+                mountains,
+                low + extent * 0.2,
+                low + extent * DVec2::new(0.4, 0.3),
+                250.0,
+                5000.0,
+                0.8,
+            )),
+        },
+        Flight {
+            name: "along the coast, 50 m/s",
+            field: coast,
+            finest: coast.finest_level(),
+            camera: Box::new(over(
+                coast,
+                south + size * DVec2::new(0.3, 0.35),
+                south + size * DVec2::new(0.6, 0.4),
+                50.0,
+                60.0,
+                0.05,
+            )),
+        },
+        Flight {
+            name: "over the sea, 20 m/s",
+            field: sea,
+            finest: 12,
+            camera: Box::new(|t| {
+                let eye = DVec3::new(-500.0 + 20.0 * t, -800.0, 25.0);
+                (eye, eye + DVec3::new(300.0, 900.0, -120.0))
+            }),
+        },
+    ]
+}
+
+impl Answer {
+    fn table(&self) -> String {
+        let mut text = format!(
+            "{} x {} pixels, tolerance {} pixels, at most {} triangles; medians of the frames of each flight\n",
+            self.frame[0], self.frame[1], self.tolerance_pixels, self.most_triangles
+        );
+        let mut flight = "";
+        for row in &self.flights {
+            if row.flight != flight {
+                flight = row.flight;
+                text += &format!(
+                    "\n{flight}\n  {:<12} {:>10} {:>10} {:>8} {:>24} {:>7} {:>16} {:>8} {:>8}\n",
+                    "method",
+                    "triangles",
+                    "vertices",
+                    "bound",
+                    "error max 99 % mean",
+                    "pop",
+                    "select ms 99 %",
+                    "mesh ms",
+                    "MB"
+                );
+            }
+            let number = |v: f32| tidy(f64::from(v), if v < 10.0 { 2 } else { 0 });
+            let three = [row.error_max_pixels, row.error_99_pixels, row.error_mean_pixels].map(number).join("  ");
+            let select = format!("{}  {}", tidy(row.select_ms, 2), tidy(row.select_99_ms, 2));
+            text += &format!(
+                "  {:<12} {:>10} {:>10} {:>8} {three:>24} {:>7} {select:>16} {:>8} {:>8}\n",
+                row.method,
+                row.triangles,
+                row.vertices,
+                number(row.bound_pixels),
+                number(row.pop_pixels),
+                tidy(row.mesh_ms, 2),
+                tidy(row.mesh_mb, 1)
+            );
+        }
+        text
+    }
+}
