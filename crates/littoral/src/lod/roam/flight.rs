@@ -639,7 +639,7 @@ impl<'a> RoamFlight<'a> {
         loop {
             self.ready.clear();
             steps += 1;
-            if steps % 16 == 0 && stop() {
+            if steps.is_multiple_of(16) && stop() {
                 stopped = true;
                 break;
             }
