@@ -15,7 +15,7 @@ pub fn median(runs: usize, mut work: impl FnMut()) -> f64 {
 
 /// Processor time of this process (s), so that others on the machine count less.
 #[cfg(target_os = "linux")]
-fn processor_time() -> f64 {
+pub fn processor_time() -> f64 {
     unsafe extern "C" {
         fn clock_gettime(clock: i32, time: *mut [i64; 2]) -> i32;
     }
@@ -27,7 +27,7 @@ fn processor_time() -> f64 {
 
 /// Time by the wall (s), where nothing better is at hand.
 #[cfg(not(target_os = "linux"))]
-fn processor_time() -> f64 {
+pub fn processor_time() -> f64 {
     static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     BEGIN.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }

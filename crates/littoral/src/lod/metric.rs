@@ -116,6 +116,12 @@ impl ScreenMetric {
         self.eye
     }
 
+    /// Straight ahead, the frame's four sides (normals pointing inward), pixels a unit of tangent covers, and the greatest distance in the frame
+    /// as a multiple of the depth: for who measures many boxes at once.
+    pub(super) fn lens(&self) -> (Vec3, [Vec3; 4], f32, f32) {
+        (self.forward, self.sides, self.focal, self.stretch)
+    }
+
     /// A box round the surface over `cell`, whose heights lie within `range`.
     pub fn bounds(&self, cell: Cell, range: HeightRange) -> Bounds {
         let (low, high) = match self.datum {

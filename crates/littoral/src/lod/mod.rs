@@ -16,6 +16,7 @@ mod metric;
 mod nested;
 mod patches;
 mod quadtree;
+mod roam;
 mod whole;
 
 pub use drawing::{Drawing, Edge, Mesh, Patch, Stencil, Vertex};
@@ -23,6 +24,7 @@ pub use metric::{Bounds, ScreenMetric, ViewError};
 pub use nested::{Nested, Seams};
 pub use patches::Patches;
 pub use quadtree::Quadtree;
+pub use roam::{NestedBounds, Priority, Roam, RoamFlight};
 pub use whole::Whole;
 
 use crate::field::HeightField;

@@ -7,12 +7,13 @@
 
 mod check;
 mod memory;
+mod roam;
 
 use check::{Case, check};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::{Fbm, NoiseField};
 use littoral::field::{HeightField, Land, Raster, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Seams, ViewError, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Roam, Seams, ViewError, Whole};
 use littoral::space::{Datum, View};
 use littoral::waves::{SeaState, Superposition};
 
@@ -49,6 +50,7 @@ pub const METHODS: &[Method] = &[
     Method { name: "nested, morphing", make: |limits| nested(limits, Seams::Morphing) },
     Method { name: "quadtree", make: |limits| Box::new(Quadtree::new(limits)) },
     Method { name: "patches", make: |limits| Box::new(Patches::new(limits)) },
+    Method { name: "roam", make: |limits| Box::new(Roam::new(limits)) },
 ];
 
 /// Nested grids of few cells.
@@ -69,6 +71,10 @@ pub struct Surface {
 }
 
 pub fn random_land(columns: usize, rows: usize, random: &mut Random) -> Surface {
+    surface_of(random_terrain(columns, rows, random))
+}
+
+pub fn random_terrain(columns: usize, rows: usize, random: &mut Random) -> Land {
     let kind = random.below(5);
     let void_share = [0.0, 0.0, 0.03, 0.4][random.below(4) as usize];
     let fbm = Fbm::new(9.0, 50.0, 4, random.below(1000));
@@ -86,9 +92,13 @@ pub fn random_land(columns: usize, rows: usize, random: &mut Random) -> Surface 
     });
     let heights: Vec<f32> = heights.collect();
     let spacing = DVec2::new(0.5 + random.unit() * 10.0, 0.5 + random.unit() * 10.0);
-    let land = Land::new(Raster::new(columns, rows, spacing, heights).expect("sizes are valid"));
+    Land::new(Raster::new(columns, rows, spacing, heights).expect("sizes are valid"))
+}
+
+pub fn surface_of(land: Land) -> Surface {
     let (finest, extent, origin) = (land.finest_level(), land.extent(), land.origin());
-    Surface { field: Box::new(land), finest, samples: Some((columns, rows)), extent, origin }
+    let samples = Some((land.raster().columns(), land.raster().rows()));
+    Surface { field: Box::new(land), finest, samples, extent, origin }
 }
 
 pub fn random_surface(random: &mut Random) -> Surface {

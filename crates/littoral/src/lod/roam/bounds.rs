@@ -1,0 +1,343 @@
+//! What the bintree's priorities rest on, prepared: for every diamond how far its triangles are off, and how low and high they reach.
+//!
+//! Both are *nested*: a diamond's numbers hold for all diamonds that need it, through any chain of parents, too. So no priority computed from them
+//! grows when a triangle is split, and the diamonds above any priority are a mesh without forced splits. What needs a diamond lies within one
+//! cell's side of the middle: for the middle of a cell of side s, s/2 of its own, then s/2 + s/4 + … of ever smaller cells beyond its sides.
+//!
+//! Deviations are measured at every sample of every triangle. Over the patches that a triangle holds whole the bilinear surface is farthest from
+//! it at a sample; those that its diagonal base cuts bulge by a quarter of their twist, which is added. Legs are bases of smaller triangles.
+
+use super::diamond::{Base, Diamond, Point};
+use crate::field::{HeightField, Land};
+use crate::space::{Cell, Datum};
+use rayon::prelude::*;
+
+/// Deviation and extent of a diamond, nested; and what its own triangles cover.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Bound {
+    /// The deviation's bits, rounded up to a multiple of sixteen, and four marks: whether the triangles are whole, and whether they are void.
+    bits: u32,
+    /// Lowest and highest height of the surface (steps); low > high where there is none.
+    pub low: u16,
+    pub high: u16,
+}
+
+impl Bound {
+    const EMPTY: Bound = Bound { bits: 0b1100, low: u16::MAX, high: 0 };
+
+    pub(super) fn new(deviation: f32, low: u16, high: u16, cover: [Cover; 2]) -> Bound {
+        let mark = |side: usize| match cover[side] {
+            Cover::Whole => 1 << side,
+            Cover::Void => 4 << side,
+            Cover::Partial => 0,
+        };
+        Bound { bits: ((deviation.to_bits() + 15) & !15) | mark(0) | mark(1), low, high }
+    }
+
+    /// Greatest vertical distance to the surface (m); infinite where partly void.
+    #[inline]
+    pub(super) fn deviation(self) -> f32 {
+        f32::from_bits(self.bits & !15)
+    }
+
+    /// Whether there is surface under all of a triangle.
+    #[inline]
+    pub(super) fn whole(self, side: usize) -> bool {
+        self.bits >> side & 1 == 1
+    }
+
+    fn cover(self, side: usize) -> Cover {
+        match (self.bits >> side & 1, self.bits >> side & 4) {
+            (1, _) => Cover::Whole,
+            (_, 4) => Cover::Void,
+            _ => Cover::Partial,
+        }
+    }
+}
+
+/// How much of a triangle there is surface under.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Cover {
+    Whole,
+    Partial,
+    Void,
+}
+
+/// Nested bounds of every diamond over land: eight bytes a sample.
+#[derive(Clone, Debug)]
+pub struct NestedBounds {
+    datum: Datum,
+    finest: u8,
+    /// Height of step 0 and of one step (m).
+    pub(super) base: f32,
+    pub(super) step: f32,
+    /// Samples a side: 2ᵏ + 1.
+    side: usize,
+    /// Heights (m), row by row; NaN where void.
+    heights: Vec<f32>,
+    levels: Vec<Level>,
+}
+
+/// The diamonds of the cells of one level and of their sides.
+#[derive(Clone, Debug, Default)]
+struct Level {
+    squares: Vec<Bound>,
+    /// Sides that run east: cells a side × (cells a side + 1).
+    east: Vec<Bound>,
+    /// Sides that run north: (cells a side + 1) × cells a side.
+    north: Vec<Bound>,
+}
+
+impl NestedBounds {
+    /// Measures `land`.
+    pub fn of(land: &Land) -> NestedBounds {
+        let finest = land.finest_level();
+        let side = (1usize << finest) + 1;
+        let raster = land.raster();
+        let mut heights = vec![f32::NAN; side * side];
+        heights.par_chunks_mut(side).take(raster.rows()).enumerate().for_each(|(row, line)| {
+            let own = &raster.heights()[row * raster.columns()..(row + 1) * raster.columns()];
+            line[..own.len()].copy_from_slice(own);
+            if raster.voids().any() {
+                let voids = (0..own.len()).filter(|&column| raster.sample(column, row).is_none());
+                voids.for_each(|column| line[column] = f32::NAN);
+            }
+        });
+        let range = land.height_range();
+        let (low, high) = if range.is_empty() { (0.0, 0.0) } else { (range.low, range.high) };
+        let step = (high / 65_000.0 - low / 65_000.0).max(low.abs().max(high.abs()) * 1e-6).max(1e-30);
+        let base = low - 2.0 * step;
+        let levels = vec![Level::default(); usize::from(finest) + 1];
+        let mut bounds = NestedBounds { datum: land.datum(), finest, base, step, side, heights, levels };
+        for level in (0..=finest).rev() {
+            if level < finest {
+                let n = 1usize << level;
+                let all = |columns: usize, rows: usize, of: &(dyn Fn(usize, usize) -> Bound + Sync)| {
+                    let mut all = vec![Bound::EMPTY; columns * rows];
+                    all.par_chunks_mut(columns).enumerate().for_each(|(row, line)| {
+                        line.iter_mut().enumerate().for_each(|(column, bound)| *bound = of(column, row));
+                    });
+                    all
+                };
+                let half = Diamond::ROOT.half >> level;
+                let at = |i: usize, j: usize| [i as u32 * half, j as u32 * half];
+                let east = all(n, n + 1, &|i, j| bounds.measure(land, Diamond::at(at(2 * i + 1, 2 * j))));
+                let north = all(n + 1, n, &|i, j| bounds.measure(land, Diamond::at(at(2 * i, 2 * j + 1))));
+                bounds.levels[usize::from(level)].east = east;
+                bounds.levels[usize::from(level)].north = north;
+                let squares = all(n, n, &|i, j| bounds.measure(land, Diamond::at(at(2 * i + 1, 2 * j + 1))));
+                bounds.levels[usize::from(level)].squares = squares;
+            }
+        }
+        bounds
+    }
+
+    /// Bytes of memory held, heights included.
+    pub fn bytes(&self) -> usize {
+        let count = |level: &Level| level.squares.len() + level.east.len() + level.north.len();
+        self.heights.len() * size_of::<f32>() + self.levels.iter().map(count).sum::<usize>() * size_of::<Bound>()
+    }
+
+    /// What the heights are counted from.
+    pub fn datum(&self) -> Datum {
+        self.datum
+    }
+
+    /// The level of the samples.
+    pub fn finest(&self) -> u8 {
+        self.finest
+    }
+
+    /// Height (m) of a lattice point that is a sample; NaN where void.
+    #[inline]
+    pub(super) fn height(&self, at: Point) -> f32 {
+        let [x, y] = self.sample(at);
+        self.heights[y * self.side + x]
+    }
+
+    #[inline]
+    fn sample(&self, at: Point) -> [usize; 2] {
+        at.map(|c| (c >> (Cell::MAX_LEVEL - self.finest)) as usize)
+    }
+
+    /// Where the bound of a diamond above the level of the samples is kept.
+    #[inline]
+    fn slot(&self, diamond: Diamond) -> &Bound {
+        let level = diamond.cell_level();
+        let of = &self.levels[usize::from(level)];
+        let n = 1usize << level;
+        let [i, j] = diamond.at.map(|c| (c >> (Cell::MAX_LEVEL - level)) as usize);
+        match diamond.base {
+            Base::Rising | Base::Falling => &of.squares[j * n + i],
+            Base::East => &of.east[j * n + i],
+            Base::North => &of.north[j * (n + 1) + i],
+        }
+    }
+
+    /// Begins to load what a split of the diamond will ask for.
+    pub(super) fn expect(&self, diamond: Diamond) {
+        let [x, y] = self.sample(diamond.at);
+        prefetch(&self.heights[y * self.side + x]);
+        for child in diamond.children().into_iter().flatten() {
+            if child.cell_level() < self.finest {
+                prefetch(self.slot(child));
+            }
+        }
+    }
+
+    /// The bound of a diamond; empty below the level of the samples, save for the patches themselves.
+    #[inline]
+    pub(super) fn bound(&self, diamond: Diamond) -> Bound {
+        if diamond.cell_level() >= self.finest { self.patch(diamond) } else { *self.slot(diamond) }
+    }
+
+    fn corners(&self, x: usize, y: usize) -> Option<[f32; 4]> {
+        if x + 1 >= self.side || y + 1 >= self.side {
+            return None;
+        }
+        let at = y * self.side + x;
+        let all =
+            [self.heights[at], self.heights[at + 1], self.heights[at + self.side], self.heights[at + self.side + 1]];
+        all.iter().all(|h| !h.is_nan()).then_some(all)
+    }
+
+    /// The bound of a patch between four samples.
+    fn patch(&self, diamond: Diamond) -> Bound {
+        if diamond.cell_level() > self.finest || !diamond.is_square() {
+            return Bound::EMPTY;
+        }
+        let [x, y] = diamond.at.map(|c| (c >> (Cell::MAX_LEVEL - self.finest)) as usize);
+        let Some([a, b, c, d]) = self.corners(x, y) else { return Bound::EMPTY };
+        let size = a.abs().max(b.abs()).max(c.abs().max(d.abs()));
+        let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+        let twist = 0.25 * ((a - b) - (c - d)).abs() + size * f32::EPSILON;
+        Bound::new(twist, self.down(low), self.up(high), [Cover::Whole; 2])
+    }
+
+    fn decoded(&self, steps: u16) -> f32 {
+        self.base + f32::from(steps) * self.step
+    }
+
+    fn down(&self, height: f32) -> u16 {
+        let steps = ((height - self.base) / self.step) as u16;
+        steps - u16::from(self.decoded(steps) > height && steps > 0)
+    }
+
+    fn up(&self, height: f32) -> u16 {
+        let steps = ((height - self.base) / self.step) as u16;
+        steps + u16::from(self.decoded(steps) < height)
+    }
+
+    /// Measures a diamond whose children are known.
+    fn measure(&self, land: &Land, diamond: Diamond) -> Bound {
+        let apexes = diamond.apexes();
+        let mut parts: [Option<Cover>; 2] = [None; 2];
+        let (mut deviation, mut low, mut high) = (0.0f32, u16::MAX, 0);
+        for child in diamond.children().into_iter().flatten() {
+            let bound = self.bound(child);
+            (deviation, low, high) = (deviation.max(bound.deviation()), low.min(bound.low), high.max(bound.high));
+            let own = child.apexes().iter().position(|apex| *apex == Some(diamond.at)).expect("this is its parent");
+            let side = usize::from(apexes[0].is_none_or(|apex| !child.ends().contains(&apex)));
+            let cover = bound.cover(own);
+            parts[side] = Some(if parts[side].is_none_or(|other| other == cover) { cover } else { Cover::Partial });
+        }
+        let cover = parts.map(|part| part.unwrap_or(Cover::Void));
+        for (apex, cover) in apexes.into_iter().zip(cover) {
+            let Some(apex) = apex else { continue };
+            match cover {
+                Cover::Partial => {
+                    deviation = f32::INFINITY;
+                    // What is partly void is as far off as its whole cell is large.
+                    let range = land.range(diamond.cell(apex));
+                    (low, high) = (low.min(self.down(range.low)), high.max(self.up(range.high)));
+                }
+                Cover::Void => {}
+                // No triangle over heights of a range leaves it.
+                Cover::Whole if deviation.is_finite() => {
+                    let most = self.decoded(high) - self.decoded(low);
+                    deviation = deviation.max(self.triangle(diamond, apex).min(most.next_up()));
+                }
+                Cover::Whole => {}
+            }
+        }
+        Bound::new(deviation, low, high, cover)
+    }
+
+    /// The deviation of the triangle towards `apex`, which is whole.
+    fn triangle(&self, diamond: Diamond, apex: Point) -> f32 {
+        let corners = diamond.triangle(apex).map(|p| self.sample(p));
+        let [a, b, c] = corners.map(|[x, y]| self.heights[y * self.side + x]);
+        let [pa, pb, pc] = corners.map(|p| p.map(|c| c as i64));
+        let (low_y, high_y) = (pa[1].min(pb[1]).min(pc[1]), pa[1].max(pb[1]).max(pc[1]));
+        let low_x = pa[0].min(pb[0]).min(pc[0]);
+        let high_x = pa[0].max(pb[0]).max(pc[0]);
+        // Height = a + gx (x − ax) + gy (y − ay). Legs or base lie along the axes, so slopes are divided by powers of two.
+        let area = ((pb[0] - pa[0]) * (pc[1] - pa[1]) - (pb[1] - pa[1]) * (pc[0] - pa[0])) as f32;
+        let gx = ((b - a) * (pc[1] - pa[1]) as f32 - (c - a) * (pb[1] - pa[1]) as f32) / area;
+        let gy = ((c - a) * (pb[0] - pa[0]) as f32 - (b - a) * (pc[0] - pa[0]) as f32) / area;
+        let size = a.abs().max(b.abs()).max(c.abs());
+        let mut worst = 0.0f32;
+        let s = high_y - low_y;
+        for row in low_y..=high_y {
+            let j = row - low_y;
+            // First and last column of the row.
+            let (from, to) = match diamond.base {
+                Base::Rising if apex[0] > diamond.at[0] => (low_x + j, high_x),
+                Base::Rising => (low_x, low_x + j),
+                Base::Falling if apex[0] > diamond.at[0] => (high_x - j, high_x),
+                Base::Falling => (low_x, high_x - j),
+                Base::East if apex[1] > diamond.at[1] => (low_x + j, high_x - j),
+                Base::East => (low_x + s - j, high_x - s + j),
+                Base::North if apex[0] > diamond.at[0] => (low_x, low_x + j.min(s - j)),
+                Base::North => (high_x - j.min(s - j), high_x),
+            };
+            let line = &self.heights[row as usize * self.side + from as usize..=row as usize * self.side + to as usize];
+            let start = a + gy * (row - pa[1]) as f32 + gx * (from - pa[0]) as f32;
+            worst = worst.max(line_deviation(line, start, gx));
+        }
+        let mut twist = 0.0f32;
+        if diamond.is_square() {
+            for j in 0..s {
+                let x = if diamond.base == Base::Rising { low_x + j } else { high_x - 1 - j };
+                if let Some([a, b, c, d]) = self.corners(x as usize, (low_y + j) as usize) {
+                    twist = twist.max(((a - b) - (c - d)).abs());
+                }
+            }
+        }
+        worst + 0.25 * twist + (8.0 * size + worst) * 8.0 * f32::EPSILON
+    }
+}
+
+/// Begins to load a line of memory.
+#[inline]
+fn prefetch<T>(what: &T) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: a hint; it reads nothing that the program can see.
+    unsafe {
+        std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(std::ptr::from_ref(what).cast());
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = what;
+}
+
+/// The greatest distance of `heights` from the line `start + i · step`.
+#[inline]
+fn line_deviation(heights: &[f32], start: f32, step: f32) -> f32 {
+    const LANES: usize = 16;
+    let mut worst = [0.0f32; LANES];
+    let mut chunks = heights.chunks_exact(LANES);
+    let mut base = 0.0;
+    for chunk in &mut chunks {
+        for lane in 0..LANES {
+            let difference = (chunk[lane] - (start + (base + lane as f32) * step)).abs();
+            worst[lane] = if difference > worst[lane] { difference } else { worst[lane] };
+        }
+        base += LANES as f32;
+    }
+    let mut most = 0.0f32;
+    for (i, height) in chunks.remainder().iter().enumerate() {
+        let difference = (height - (start + (base + i as f32) * step)).abs();
+        most = if difference > most { difference } else { most };
+    }
+    worst.into_iter().fold(most, f32::max)
+}

@@ -1,0 +1,193 @@
+//! The bintree by its vertices: who splits what, told by integers.
+//!
+//! Every triangle of the bintree is bisected at the middle of its base, and the two triangles that share a base (a *diamond*) are bisected
+//! together. So a diamond has a name, the lattice point in the middle of its base, and a mesh is the set of diamonds that are split. Two kinds
+//! take turns: the base of a *square* diamond is a diagonal of a cell of the quadtree, that of a *side* diamond a side of one. A diamond can be
+//! split when both of its triangles are there, each made by the split of a *parent*, whose middle is the triangle's apex:
+//!
+//! ```text
+//!    square of a cell          side of a cell
+//!    M₂──────B                     P'
+//!    │     ╱ │                   ╱   ╲
+//!    │   v   │                  a──v──b
+//!    │ ╱     │                   ╲   ╱
+//!    A──────M₁                     P
+//! ```
+//!
+//! The parents of a cell's middle v are the two corners M that its diagonal misses; those of a side's middle are the middles P of the
+//! cells on both sides. A mesh without T-vertices is a set of diamonds that holds the parents of each of its members.
+
+use crate::space::Cell;
+
+/// Steps of the lattice along a face's side.
+pub(super) const STEPS: u32 = 1 << Cell::MAX_LEVEL;
+
+/// The finest cells whose middles lie on the lattice.
+pub(super) const FINEST: u8 = Cell::MAX_LEVEL - 1;
+
+/// A point of the lattice.
+pub(super) type Point = [u32; 2];
+
+/// A diamond, named by the middle of its base.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Diamond {
+    /// The middle of the base.
+    pub at: Point,
+    /// Half a cell's side.
+    pub half: u32,
+    /// Which way the base runs.
+    pub base: Base,
+}
+
+/// Which way the base of a diamond runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Base {
+    /// Along a cell's diagonal, northward to the east.
+    Rising,
+    /// Along a cell's diagonal, southward to the east.
+    Falling,
+    /// Along a side, eastward.
+    East,
+    /// Along a side, northward.
+    North,
+}
+
+impl Diamond {
+    /// The diamond of the whole face.
+    pub const ROOT: Diamond = Diamond { at: [STEPS / 2; 2], half: STEPS / 2, base: Base::Rising };
+
+    /// The diamond whose base has its middle at a point that is no corner of the face.
+    pub fn at(at: Point) -> Diamond {
+        let zeros = (at[0] | at[1]).trailing_zeros();
+        let half = 1 << zeros;
+        let [x, y] = at.map(|c| c >> zeros);
+        let base = match (x & 1 == 1, y & 1 == 1) {
+            (true, true) if ((x >> 1) + (y >> 1)) & 1 == 0 => Base::Rising,
+            (true, true) => Base::Falling,
+            (true, false) => Base::East,
+            _ => Base::North,
+        };
+        Diamond { at, half, base }
+    }
+
+    /// Whether the base is a cell's diagonal.
+    pub fn is_square(self) -> bool {
+        matches!(self.base, Base::Rising | Base::Falling)
+    }
+
+    /// Level of the cell whose diagonal or side the base is.
+    pub fn cell_level(self) -> u8 {
+        Cell::MAX_LEVEL - 1 - self.half.trailing_zeros() as u8
+    }
+
+    /// Depth in the bintree, 0 for the whole face: parents have a smaller one.
+    pub fn level(self) -> u8 {
+        2 * self.cell_level() + u8::from(!self.is_square())
+    }
+
+    /// A number that no other diamond has.
+    pub fn name(self) -> u64 {
+        u64::from(self.at[0]) << 32 | u64::from(self.at[1])
+    }
+
+    fn shifted(self, by: [i32; 2]) -> Option<Point> {
+        let [x, y] = [0, 1].map(|i| self.at[i].wrapping_add_signed(by[i]));
+        (x <= STEPS && y <= STEPS).then_some([x, y])
+    }
+
+    /// The ends of the base.
+    pub fn ends(self) -> [Point; 2] {
+        let h = self.half;
+        let [x, y] = self.at;
+        match self.base {
+            Base::Rising => [[x - h, y - h], [x + h, y + h]],
+            Base::Falling => [[x - h, y + h], [x + h, y - h]],
+            Base::East => [[x - h, y], [x + h, y]],
+            Base::North => [[x, y - h], [x, y + h]],
+        }
+    }
+
+    /// The apexes of its two triangles; the second is missing at the face's border. Except for the whole face they are its parents.
+    pub fn apexes(self) -> [Option<Point>; 2] {
+        let h = self.half as i32;
+        let both = match self.base {
+            Base::Rising => [[h, -h], [-h, h]],
+            Base::Falling => [[h, h], [-h, -h]],
+            Base::East => [[0, h], [0, -h]],
+            Base::North => [[-h, 0], [h, 0]],
+        };
+        match both.map(|by| self.shifted(by)) {
+            [None, second] => [second, None],
+            both => both,
+        }
+    }
+
+    /// The diamonds that must be split before this one.
+    pub fn parents(self) -> [Option<Diamond>; 2] {
+        if self == Diamond::ROOT { [None; 2] } else { self.apexes().map(|apex| apex.map(Diamond::at)) }
+    }
+
+    /// The diamonds that this one is a parent of.
+    pub fn children(self) -> [Option<Diamond>; 4] {
+        let h = self.half as i32;
+        let by = if self.is_square() {
+            [[0, -h], [h, 0], [0, h], [-h, 0]]
+        } else {
+            let q = h / 2;
+            [[-q, -q], [q, -q], [q, q], [-q, q]]
+        };
+        if !self.is_square() && self.half == 1 {
+            return [None; 4];
+        }
+        by.map(|by| self.shifted(by).map(Diamond::at))
+    }
+
+    /// The cell whose diagonal the base is, or that lies on the side of `apex`.
+    pub fn cell(self, apex: Point) -> Cell {
+        let middle = if self.is_square() { self.at } else { apex };
+        let level = self.cell_level();
+        let [x, y] = middle.map(|c| c >> (Cell::MAX_LEVEL - level));
+        Cell { face: 0, level, x, y }
+    }
+
+    /// The corners of its triangle towards `apex`, counter-clockwise.
+    pub fn triangle(self, apex: Point) -> [Point; 3] {
+        let [a, b] = self.ends();
+        let [a64, b64, c64] = [a, b, apex].map(|p| p.map(i64::from));
+        let area = (b64[0] - a64[0]) * (c64[1] - a64[1]) - (b64[1] - a64[1]) * (c64[0] - a64[0]);
+        if area > 0 { [a, b, apex] } else { [b, a, apex] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parents_and_children_agree() {
+        let mut level = vec![Diamond::ROOT];
+        for depth in 0..12 {
+            let mut next = Vec::new();
+            for diamond in &level {
+                assert_eq!(diamond.level(), depth);
+                for child in diamond.children().into_iter().flatten() {
+                    assert!(child.parents().contains(&Some(*diamond)), "{child:?} of {diamond:?}");
+                    assert!(child.triangle(diamond.at).iter().all(|p| p.iter().all(|&c| c <= STEPS)));
+                    next.push(child);
+                }
+            }
+            next.sort_by_key(|d| d.name());
+            next.dedup();
+            // Middles of cells: a fourth of their samples; middles of sides: both ways, and one more at the border.
+            let cells = 1u64 << (next[0].cell_level());
+            let expected = if next[0].is_square() { cells * cells } else { 2 * cells * (cells + 1) };
+            assert_eq!(next.len() as u64, expected);
+            for diamond in &next {
+                for parent in diamond.parents().into_iter().flatten() {
+                    assert!(parent.children().contains(&Some(*diamond)));
+                }
+            }
+            level = next;
+        }
+    }
+}

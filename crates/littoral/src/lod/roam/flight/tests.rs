@@ -1,0 +1,204 @@
+//! Against Algorithm I, from scratch and without any queue.
+
+use super::*;
+use crate::field::{Land, Raster};
+use glam::{DVec2, DVec3, UVec2};
+use proptest::prelude::*;
+use std::collections::BTreeSet;
+
+/// Splits, one at a time, the triangle of greatest priority among all that are there; returns the triangles, and the greatest priority left.
+fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
+    let lens = flight.lens.as_ref().expect("a view was seen");
+    let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
+    let mut split: BTreeSet<u64> = BTreeSet::new();
+    let mut leaves: Vec<(Diamond, usize)> = vec![(Diamond::ROOT, 0), (Diamond::ROOT, 1)];
+    loop {
+        let splittable = leaves.iter().filter(|(d, _)| flight.idle(*d) == SPLIT && number(*d) > flight.tolerance);
+        let top = splittable.max_by_key(|(d, _)| key(number(*d), *d, 0)).copied();
+        let Some((top, _)) = top else { break };
+        // What must be split with it: parents of parents, as far as they are not.
+        let mut forced = vec![top];
+        let mut at = 0;
+        while at < forced.len() {
+            for parent in forced[at].parents().into_iter().flatten() {
+                if !split.contains(&parent.name()) && !forced.contains(&parent) {
+                    forced.push(parent);
+                }
+            }
+            at += 1;
+        }
+        let more: usize = forced.iter().map(|d| d.apexes().into_iter().flatten().count()).sum();
+        if leaves.len() + more > flight.limits.triangles {
+            break;
+        }
+        forced.sort_by_key(|d| d.level());
+        for diamond in forced {
+            split.insert(diamond.name());
+            let before = leaves.len();
+            leaves.retain(|(d, _)| *d != diamond);
+            assert_eq!(
+                before - leaves.len(),
+                diamond.apexes().into_iter().flatten().count(),
+                "both of its triangles are there"
+            );
+            for child in diamond.children().into_iter().flatten() {
+                let side = child.apexes().iter().position(|apex| *apex == Some(diamond.at)).expect("a parent");
+                leaves.push((child, side));
+            }
+        }
+    }
+    let worst = leaves.iter().map(|(d, _)| number(*d)).fold(0.0, f32::max);
+    let drawn = leaves.into_iter().filter(|(d, side)| flight.bounds.bound(*d).whole(*side));
+    (drawn.map(|(d, side)| turned(d.triangle(d.apexes()[side].expect("there")))).collect(), worst)
+}
+
+/// Whether no diamond has a greater priority than those that must be split before it.
+fn nested(flight: &RoamFlight) -> bool {
+    let lens = flight.lens.as_ref().expect("a view was seen");
+    let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
+    let finest = flight.bounds.finest();
+    let mut level = vec![Diamond::ROOT];
+    while !level.is_empty() {
+        let mut next = Vec::new();
+        for diamond in level {
+            let children = diamond.children().into_iter().flatten();
+            for child in children.filter(|c| c.cell_level() < finest || c.cell_level() == finest && c.is_square()) {
+                if number(child) > number(diamond) {
+                    return false;
+                }
+                if child.apexes()[0] == Some(diamond.at) && child.cell_level() < finest {
+                    next.push(child);
+                }
+            }
+        }
+        level = next;
+    }
+    true
+}
+
+/// A triangle beginning with its least corner.
+fn turned(triangle: [Point; 3]) -> [Point; 3] {
+    let first = (0..3).min_by_key(|&i| triangle[i]).expect("three");
+    [triangle[first], triangle[(first + 1) % 3], triangle[(first + 2) % 3]]
+}
+
+fn drawn(flight: &RoamFlight) -> BTreeSet<[Point; 3]> {
+    let corner = |i: u32| flight.mesh.vertices[i as usize];
+    flight.mesh.triangles.iter().map(|t| turned(t.map(|i| [corner(i).x, corner(i).y]))).collect()
+}
+
+fn split_set(flight: &RoamFlight) -> BTreeSet<Point> {
+    let splits = flight.list.word_records().filter(|&r| flight.records[r as usize].list != NOWHERE);
+    let mut all = BTreeSet::new();
+    let mut stack: Vec<u32> = splits.collect();
+    while let Some(record) = stack.pop() {
+        let known = &flight.records[record as usize];
+        if !known.split || all.insert(known.at) {
+            stack.extend(known.parents.iter().filter(|&&parent| parent != NONE));
+        }
+    }
+    all
+}
+
+fn land(columns: usize, rows: usize, heights: &[f32]) -> Land {
+    Land::new(Raster::new(columns, rows, DVec2::new(3.0, 2.0), heights.to_vec()).expect("valid"))
+}
+
+fn cases() -> u32 {
+    std::env::var("LITTORAL_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(40)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(cases()))]
+
+    /// Whatever was seen before, the mesh is that of Algorithm I, and so is its worst triangle; and the work is what changed.
+    #[test]
+    fn every_frame_is_as_good_as_from_scratch(
+        side in (2usize..20, 2usize..20),
+        heights in prop::collection::vec(prop_oneof![9 => 0f32..60.0, 1 => Just(f32::NAN)], 400),
+        holes in any::<bool>(),
+        flat in any::<bool>(),
+        budget in prop_oneof![2usize..300, Just(100_000)],
+        tolerance in 0.3f32..40.0,
+        views in prop::collection::vec(((-0.5f64..1.5, -0.5f64..1.5, -20f64..120.0), (0f64..6.3, -1.5f64..0.5)), 1..6),
+        distance in any::<bool>(),
+    ) {
+        let (columns, rows) = side;
+        let filled = |h: &f32| if flat { 7.0 } else if h.is_nan() && !holes { 0.0 } else { *h };
+        let heights: Vec<f32> = heights.iter().map(filled).take(columns * rows).collect();
+        let land = land(columns, rows, &heights);
+        let bounds = NestedBounds::of(&land);
+        let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: budget });
+        if distance {
+            flight.priority = Priority::InverseDistance;
+        }
+        for ((u, v, up), (yaw, pitch)) in views {
+            let eye = (land.origin() + land.extent() * DVec2::new(u, v)).extend(up);
+            let ahead = DVec3::new(yaw.cos() * pitch.cos(), yaw.sin() * pitch.cos(), pitch.sin());
+            let mut view = View::looking_at(eye, eye + ahead, 1.0, UVec2::new(320, 200));
+            view.tolerance_pixels = tolerance;
+            let before = (split_set(&flight), flight.operations());
+            let reached = flight.update(&view, &mut || false).expect("a view");
+            let (triangles, worst) = algorithm_one(&flight);
+            prop_assert!(nested(&flight));
+            for part in [DVec2::new(0.0, 0.0), DVec2::new(0.3, 0.1), DVec2::new(u.abs().fract(), v.abs().fract())] {
+                let place = Place { face: 0, uv: part };
+                let point = part * f64::from(STEPS);
+                let within = |t: &[Point; 3]| {
+                    let [a, b, c] = t.map(|p| DVec2::new(f64::from(p[0]), f64::from(p[1])));
+                    [(a, b), (b, c), (c, a)].into_iter().all(|(a, b)| (b - a).perp_dot(point - a) >= 0.0)
+                };
+                match flight.triangle_at(place) {
+                    Some(found) => prop_assert!(within(&found.map(|v| [v.x, v.y]))),
+                    // On an edge the triangle beyond may be void.
+                    None => prop_assert!(triangles.iter().filter(|t| within(t)).count() == 0 || part.x == 0.0),
+                }
+            }
+            prop_assert_eq!(drawn(&flight), triangles);
+            if reached.pixels.is_finite() {
+                prop_assert_eq!(reached.pixels, worst);
+            }
+            // From scratch thresholds may overshoot; from frame to frame only what the border passes over twice is done twice.
+            let changed = before.0.symmetric_difference(&split_set(&flight)).count() as u64;
+            let done = flight.operations().0 + flight.operations().1 - before.1.0 - before.1.1;
+            prop_assert!(done >= changed);
+            if before.1.0 > 0 {
+                prop_assert!(done <= changed + 8, "{} steps for {} changes", done, changed);
+            }
+        }
+    }
+}
+
+/// A frame that is stopped is whole, and no step is lost.
+#[test]
+fn stopped_frames_catch_up() {
+    let heights: Vec<f32> = (0..65 * 65).map(|i| ((i * 7919) % 101) as f32).collect();
+    let land = land(65, 65, &heights);
+    let bounds = NestedBounds::of(&land);
+    let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: 1_500 });
+    let look = |x: f64| {
+        let mut view =
+            View::looking_at(DVec3::new(x, -60.0, 130.0), DVec3::new(x, 20.0, 50.0), 1.0, UVec2::new(320, 200));
+        view.tolerance_pixels = 0.5;
+        view
+    };
+    flight.update(&look(-60.0), &mut || false).expect("a view");
+    let mut worst = f32::INFINITY;
+    for frame in 0..100 {
+        let mut asked = 0;
+        let mut stop = || {
+            asked += 1;
+            asked > 2
+        };
+        let reached = flight.update(&look(60.0), &mut stop).expect("a view");
+        assert!(flight.triangles() <= 1_500, "frame {frame}");
+        worst = reached.pixels;
+        if asked <= 2 {
+            break;
+        }
+        assert!(reached.limited && frame < 99, "it never ends");
+    }
+    let (triangles, best) = algorithm_one(&flight);
+    assert_eq!(drawn(&flight), triangles);
+    assert_eq!(worst, best);
+}

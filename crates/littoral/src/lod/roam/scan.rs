@@ -1,0 +1,334 @@
+//! Priorities of many diamonds at once.
+//!
+//! Those that may be split or merged lie in plain arrays, one number each, and all are measured anew for every view: sixteen bytes of reading
+//! in a row cost less than any queue that would know which of them to skip. The formula is that of
+//! [`ScreenMetric`] for boxes in lattice coordinates, so that far from the origin nothing is lost. Each of its steps is monotone
+//! under rounding, too: a box within another never gets the larger number, not by a bit.
+
+use super::super::ScreenMetric;
+use crate::space::{Datum, View};
+use glam::DVec3;
+use multiversion::multiversion;
+
+/// How the detail of a drawing is distributed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Priority {
+    /// What is drawn farthest from its place comes first (pixels).
+    #[default]
+    ScreenError,
+    /// What is nearest comes first, whatever its shape (1/m): the sea of 1999. Only the limits end it.
+    InverseDistance,
+}
+
+/// A view, in the coordinates of the lists.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lens {
+    /// The eye's place, in whole steps, and what is left of it (m).
+    eye: [i32; 2],
+    rest: [f32; 2],
+    height: f32,
+    /// Height of step 0 and of one step (m).
+    base: f32,
+    step: f32,
+    /// Metres a step.
+    scale: [f32; 2],
+    forward: [f32; 3],
+    sides: [[f32; 3]; 4],
+    focal: f32,
+    stretch: f32,
+    priority: Priority,
+}
+
+impl Lens {
+    /// The lens of a view of a face cut into `steps` steps a side.
+    pub(super) fn new(
+        metric: &ScreenMetric,
+        datum: Datum,
+        steps: f64,
+        heights: (f32, f32),
+        priority: Priority,
+    ) -> Lens {
+        let (forward, sides, focal, stretch) = metric.lens();
+        let (origin, size) = match datum {
+            Datum::Plane { origin, size } => (origin, size),
+            Datum::Ellipsoid { .. } => (glam::DVec2::ZERO, glam::DVec2::ONE),
+        };
+        let eye: DVec3 = metric.eye();
+        let at = (eye.truncate() - origin) / size * steps;
+        let whole = at.floor().clamp(glam::DVec2::splat(-1e9), glam::DVec2::splat(1e9));
+        let rest = (at - whole) / steps * size;
+        Lens {
+            eye: [whole.x as i32, whole.y as i32],
+            rest: rest.as_vec2().to_array(),
+            height: eye.z as f32,
+            base: heights.0,
+            step: heights.1,
+            scale: (size / steps).as_vec2().to_array(),
+            forward: forward.to_array(),
+            sides: sides.map(|side| side.to_array()),
+            focal,
+            stretch,
+            priority,
+        }
+    }
+
+    /// The priority of one.
+    pub(super) fn priority(&self, item: &Item) -> f32 {
+        let Item { at, heights, deviation, word } = *item;
+        match self.priority {
+            Priority::ScreenError => priority::<true>(self, at, heights, deviation, word),
+            Priority::InverseDistance => priority::<false>(self, at, heights, deviation, word),
+        }
+    }
+}
+
+/// What the priority of a diamond is computed from, and who it is: sixteen bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Item {
+    /// Its middle (steps), x in the lower half.
+    pub at: u32,
+    /// Lowest and highest height within (steps of height), the lowest in the lower half.
+    pub heights: u32,
+    /// Greatest vertical distance to the surface (m); infinite where partly void.
+    pub deviation: f32,
+    /// From the lowest bit: two for the kind of entry, one for whether the square that holds all that needs the diamond is three units wide instead
+    /// of two, four for the binary logarithm of the unit (steps), the rest for the record.
+    pub word: u32,
+}
+
+impl Item {
+    pub(super) fn word(kind: u8, square: bool, unit: u32, record: u32) -> u32 {
+        u32::from(kind) | u32::from(square) << 2 | unit.trailing_zeros() << 3 | record << 7
+    }
+}
+
+/// Entries of a list: what may be split, what may be merged, what would be split if that were allowed, and what is not there.
+pub(super) const SPLIT: u8 = 0;
+pub(super) const MERGE: u8 = 1;
+pub(super) const STUCK: u8 = 2;
+pub(super) const NOWHERE: u8 = 3;
+
+/// Diamonds in arrays, with their priorities. Places stay; those left are taken again, the last left first, while its memory is near.
+#[derive(Clone, Debug, Default)]
+pub(super) struct List {
+    at: Vec<u32>,
+    heights: Vec<u32>,
+    deviation: Vec<f32>,
+    word: Vec<u32>,
+    /// Priorities, as last measured; NaN where there is no entry.
+    pub priority: Vec<f32>,
+    left: Vec<u32>,
+}
+
+impl List {
+    pub(super) fn len(&self) -> usize {
+        self.word.len()
+    }
+
+    pub(super) fn clear(&mut self) {
+        for numbers in [&mut self.at, &mut self.heights, &mut self.word, &mut self.left] {
+            numbers.clear();
+        }
+        self.deviation.clear();
+        self.priority.clear();
+    }
+
+    /// Adds one; returns where.
+    pub(super) fn add(&mut self, item: Item, priority: f32) -> u32 {
+        let Some(place) = self.left.pop() else {
+            self.at.push(item.at);
+            self.heights.push(item.heights);
+            self.deviation.push(item.deviation);
+            self.word.push(item.word);
+            self.priority.push(priority);
+            return self.word.len() as u32 - 1;
+        };
+        let i = place as usize;
+        self.at[i] = item.at;
+        self.heights[i] = item.heights;
+        self.deviation[i] = item.deviation;
+        self.word[i] = item.word;
+        self.priority[i] = priority;
+        place
+    }
+
+    /// Makes an entry one of another kind.
+    pub(super) fn turn(&mut self, place: u32, kind: u8) {
+        let word = &mut self.word[place as usize];
+        *word = *word & !3 | u32::from(kind);
+    }
+
+    /// Removes one.
+    pub(super) fn remove(&mut self, place: u32) {
+        let i = place as usize;
+        // Nothing that is compared with NaN is true, and what is computed from it stays so.
+        self.deviation[i] = f32::NAN;
+        self.priority[i] = f32::NAN;
+        self.word[i] |= u32::from(NOWHERE);
+        self.left.push(place);
+    }
+
+    /// The record of an entry.
+    pub(super) fn record(&self, place: u32) -> u32 {
+        self.word[place as usize] >> 7
+    }
+
+    /// Records of all places, left ones included.
+    #[cfg(test)]
+    pub(super) fn word_records(&self) -> impl Iterator<Item = u32> + '_ {
+        self.word.iter().map(|word| word >> 7)
+    }
+
+    /// Measures all whose number lies in `part`.
+    pub(super) fn measure(&mut self, lens: &Lens, part: std::ops::Range<usize>) {
+        let arrays = Arrays {
+            at: &self.at[part.clone()],
+            heights: &self.heights[part.clone()],
+            deviation: &self.deviation[part.clone()],
+            word: &self.word[part.clone()],
+        };
+        match lens.priority {
+            Priority::ScreenError => measure_errors(lens, arrays, &mut self.priority[part]),
+            Priority::InverseDistance => measure_distances(lens, arrays, &mut self.priority[part]),
+        }
+    }
+
+    /// Greatest priority of what is not split, and whether any above `tolerance` is of something partly void.
+    pub(super) fn worst(&self, tolerance: f32) -> (f32, bool) {
+        worst(&self.priority, &self.deviation, &self.word, tolerance)
+    }
+
+    /// Puts the places of those of a kind whose priority is above `above` and not above `most` into `found`.
+    pub(super) fn within(&self, kind: u8, above: f32, most: f32, found: &mut Vec<u32>) {
+        found.clear();
+        within(&self.priority, &self.word, kind, above, most, found);
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Arrays<'a> {
+    at: &'a [u32],
+    heights: &'a [u32],
+    deviation: &'a [f32],
+    word: &'a [u32],
+}
+
+const LANES: usize = 16;
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn measure_errors(lens: &Lens, arrays: Arrays, out: &mut [f32]) {
+    measure::<true>(lens, arrays, out);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn measure_distances(lens: &Lens, arrays: Arrays, out: &mut [f32]) {
+    measure::<false>(lens, arrays, out);
+}
+
+#[inline(always)]
+fn measure<const ERRORS: bool>(lens: &Lens, a: Arrays, out: &mut [f32]) {
+    let lens = *lens;
+    let n = out.len();
+    let (at, heights, deviation, word) = (&a.at[..n], &a.heights[..n], &a.deviation[..n], &a.word[..n]);
+    for i in 0..n {
+        out[i] = priority::<ERRORS>(&lens, at[i], heights[i], deviation[i], word[i]);
+    }
+}
+
+#[inline(always)]
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The priority of an [`Item`].
+#[inline(always)]
+fn priority<const ERRORS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f32, word: u32) -> f32 {
+    let (x, y) = ((at & 0xffff) as i32, (at >> 16) as i32);
+    let half = ((2 + (word >> 2 & 1)) << (word >> 3 & 15)) as i32;
+    let (low, high) = ((heights & 0xffff) as i32, (heights >> 16) as i32);
+    let there = low <= high;
+    let (low, high) = (lens.base + low as f32 * lens.step, lens.base + high as f32 * lens.step);
+    let x0 = (x - half - lens.eye[0]) as f32 * lens.scale[0] - lens.rest[0];
+    let x1 = (x + half - lens.eye[0]) as f32 * lens.scale[0] - lens.rest[0];
+    let y0 = (y - half - lens.eye[1]) as f32 * lens.scale[1] - lens.rest[1];
+    let y1 = (y + half - lens.eye[1]) as f32 * lens.scale[1] - lens.rest[1];
+    let (z0, z1) = (low - lens.height, high - lens.height);
+    let far_x = most(x0.abs(), x1.abs());
+    let far_y = most(y0.abs(), y1.abs());
+    let far_z = most(z0.abs(), z1.abs());
+    let slack = -2e-6 * (far_x + far_y + far_z);
+    let reach = |n: [f32; 3]| most(n[0] * x0, n[0] * x1) + most(n[1] * y0, n[1] * y1) + most(n[2] * z0, n[2] * z1);
+    let side = |i: usize| reach(lens.sides[i]);
+    let inside = least(least(side(0), side(1)), least(side(2), side(3)));
+    // A bit more than nothing, since it is the nearest that counts and boxes are not empty.
+    let seen = (inside >= slack) & (reach(lens.forward) >= View::NEAR) & there;
+    let number = if ERRORS {
+        let f = lens.forward;
+        let depth = least(f[0] * x0, f[0] * x1) + least(f[1] * y0, f[1] * y1) + least(f[2] * z0, f[2] * z1);
+        let depth = most(depth, View::NEAR);
+        let across = (far_x * far_x + far_y * far_y).sqrt();
+        let away = (far_x * far_x + far_y * far_y + far_z * far_z).sqrt();
+        let (dx, dy, dz) = (x1 - x0, y1 - y0, z1 - z0);
+        let size = (dx * dx + dy * dy + dz * dz).sqrt() * 1.0001;
+        let void = deviation == f32::INFINITY;
+        let wrong = if void { size } else { deviation };
+        let distance = if void { away } else { across };
+        let spread = least(distance / (depth * depth), lens.stretch / depth);
+        wrong * (lens.focal * 1.00002) * spread
+    } else {
+        let gap = |a: f32, b: f32| most(most(a, -b), 0.0);
+        let (gx, gy, gz) = (gap(x0, x1), gap(y0, y1), gap(z0, z1));
+        1.0 / (most(View::NEAR, (gx * gx + gy * gy + gz * gz).sqrt()))
+    };
+    let number = if seen { number } else { 0.0 };
+    // What is not there has none.
+    if deviation.is_nan() { f32::NAN } else { number }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn worst(priority: &[f32], deviation: &[f32], word: &[u32], tolerance: f32) -> (f32, bool) {
+    let mut greatest = [0.0f32; LANES];
+    let mut void = [0u32; LANES];
+    let n = priority.len() / LANES * LANES;
+    let chunks = priority.chunks_exact(LANES).zip(deviation.chunks_exact(LANES)).zip(word.chunks_exact(LANES));
+    for ((priority, deviation), word) in chunks {
+        for lane in 0..LANES {
+            let p = if word[lane] & 1 == 0 { priority[lane] } else { 0.0 };
+            greatest[lane] = most(p, greatest[lane]);
+            void[lane] |= u32::from(p > tolerance) & u32::from(deviation[lane] == f32::INFINITY);
+        }
+    }
+    for i in n..priority.len() {
+        let p = if word[i] & 1 == 0 { priority[i] } else { 0.0 };
+        greatest[0] = most(p, greatest[0]);
+        void[0] |= u32::from(p > tolerance) & u32::from(deviation[i] == f32::INFINITY);
+    }
+    (greatest.into_iter().fold(0.0, most), void.into_iter().any(|void| void > 0))
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn within(priority: &[f32], word: &[u32], kind: u8, above: f32, most: f32, found: &mut Vec<u32>) {
+    let kind = u32::from(kind);
+    let n = priority.len() / LANES * LANES;
+    for (block, (numbers, words)) in priority.chunks_exact(LANES).zip(word.chunks_exact(LANES)).enumerate() {
+        let mut mask = 0u32;
+        for lane in 0..LANES {
+            let (p, word) = (numbers[lane], words[lane]);
+            mask |= (u32::from(p > above) & u32::from(p <= most) & u32::from(word & 3 == kind)) << lane;
+        }
+        while mask != 0 {
+            found.push(block as u32 * LANES as u32 + mask.trailing_zeros());
+            mask &= mask - 1;
+        }
+    }
+    for i in n..priority.len() {
+        if priority[i] > above && priority[i] <= most && word[i] & 3 == kind {
+            found.push(i as u32);
+        }
+    }
+}
