@@ -7,7 +7,7 @@ use crate::talk::{Failure, Talk, tidy};
 use clap::ValueEnum;
 use glam::DVec3;
 use littoral::field::{HeightField, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, Nested, Patches, Quadtree, Reached, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Nested, Patches, Quadtree, Reached, Roam, Whole};
 use littoral::space::View;
 use std::time::Instant;
 
@@ -42,6 +42,8 @@ pub enum Method {
     Quadtree,
     /// Triangles cut level by level, edges deciding
     Patches,
+    /// A bintree of right triangles, the worst split first
+    Roam,
 }
 
 impl Method {
@@ -52,6 +54,7 @@ impl Method {
             Method::Nested => Box::new(Nested::new(limits)),
             Method::Quadtree => Box::new(Quadtree::new(limits)),
             Method::Patches => Box::new(Patches::new(limits)),
+            Method::Roam => Box::new(Roam::new(limits)),
         }
     }
 }

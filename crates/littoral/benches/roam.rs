@@ -22,7 +22,7 @@ fn main() {
         Err(_) => invented(SAMPLES),
     };
     let begin = processor_time();
-    let bounds = NestedBounds::of(&land);
+    let bounds = NestedBounds::of(&land).expect("few samples");
     println!(
         "prepared in {:.2} s of processor time, {:.1} bytes a sample, heights included",
         processor_time() - begin,

@@ -6,7 +6,7 @@ use crate::talk::{Failure, Talk, progress, tidy};
 use clap::ValueEnum;
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::{HeightField, Land, Sea, coast};
-use littoral::lod::{Drawing, Limits, Mesh};
+use littoral::lod::{Drawing, Limits, Mesh, NestedBounds, RoamFlight};
 use littoral::picture::mesh_errors;
 use littoral::space::{Datum, View};
 use littoral::waves::Superposition;
@@ -16,7 +16,7 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct Lod {
     /// Samples along a side of the mountains
-    #[arg(long, default_value = "4097", value_parser = clap::value_parser!(u32).range(65..=16_385))]
+    #[arg(long, default_value = "4097", value_parser = clap::value_parser!(u32).range(65..=8193))]
     size: u32,
     /// How far from its place a mesh may be drawn, in pixels
     #[arg(long, value_name = "PIXELS", value_parser = crate::input::tolerance, default_value = "1")]
@@ -39,6 +39,8 @@ struct Flight<'a> {
     name: &'static str,
     field: &'a dyn HeightField,
     finest: u8,
+    /// What ROAM prepares to go on from frame to frame, over land.
+    bounds: Option<&'a NestedBounds>,
     /// Eye and target at an instant (s).
     camera: Box<dyn Fn(f64) -> (DVec3, DVec3) + 'a>,
 }
@@ -78,7 +80,9 @@ impl Lod {
         let waves = Superposition::of_state(&coast::sea_state(), 16, 8)
             .map_err(|e| Failure::Work(format!("the sea of the measurement: {e}")))?;
         let sea = Sea::new(datum, 0.0).with(Box::new(waves));
-        let flights = flights(&mountains, &coast, &sea);
+        let prepare = |land: &Land| NestedBounds::of(land).map_err(|e| Failure::Work(e.to_string()));
+        let bounds = [prepare(&mountains)?, prepare(&coast)?];
+        let flights = flights(&mountains, &coast, &sea, &bounds);
         let bar = progress((flights.len() * Method::value_variants().len()) as u64, "flying");
         let mut rows = Vec::new();
         for flight in &flights {
@@ -98,7 +102,10 @@ impl Lod {
     }
 
     fn fly(&self, flight: &Flight, method: Method) -> Result<Row, Failure> {
-        let mut lod = method.within(Limits { finest: flight.finest, triangles: self.triangles as usize });
+        let limits = Limits { finest: flight.finest, triangles: self.triangles as usize };
+        let mut lod = method.within(limits);
+        // Over land ROAM goes on from frame to frame, with the mesh in place.
+        let mut roam = flight.bounds.filter(|_| method == Method::Roam).map(|bounds| RoamFlight::over(bounds, limits));
         let mut drawing = Drawing::default();
         let (mut select, mut expand) = (Vec::new(), Vec::new());
         let (mut triangles, mut vertices) = (Vec::new(), Vec::new());
@@ -112,11 +119,26 @@ impl Lod {
                 ..View::looking_at(eye, target, 50f32.to_radians(), FRAME)
             };
             let start = Instant::now();
-            let reached = lod.select(flight.field, &view, &mut drawing).map_err(|e| Failure::Work(e.to_string()))?;
+            let reached = match &mut roam {
+                Some(roam) => roam.update(&view, &mut || false),
+                None => lod.select(flight.field, &view, &mut drawing),
+            };
+            let reached = reached.map_err(|e| Failure::Work(e.to_string()))?;
             let chosen = Instant::now();
-            drawing.expand(flight.field);
-            select.push((chosen - start).as_secs_f64() * 1e3);
-            expand.push(chosen.elapsed().as_secs_f64() * 1e3);
+            match &roam {
+                Some(_) => expand.push(0.0),
+                None => {
+                    drawing.expand(flight.field);
+                    expand.push(chosen.elapsed().as_secs_f64() * 1e3);
+                }
+            }
+            // The first frame comes from nothing.
+            if frame > 0 || self.frames < 3 {
+                select.push((chosen - start).as_secs_f64() * 1e3);
+            }
+            if let Some(roam) = &roam {
+                drawing.mesh.clone_from(roam.mesh());
+            }
             triangles.push(drawing.mesh.triangles.len());
             vertices.push(drawing.mesh.vertices.len());
             bound = bound.max(reached.pixels);
@@ -159,7 +181,7 @@ impl Lod {
 }
 
 /// Low over mountains, high above them, along the coast, and over the open sea.
-fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea) -> Vec<Flight<'a>> {
+fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea, bounds: &'a [NestedBounds; 2]) -> Vec<Flight<'a>> {
     let ground = |land: &Land, at: DVec2| f64::from(land.height_at(at).unwrap_or(0.0)).max(0.0);
     let over = move |land: &'a Land, from: DVec2, to: DVec2, speed: f64, above: f64, down: f64| {
         let ahead = (to - from).normalize();
@@ -181,6 +203,7 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea) -> Vec<Flight
             name: "low over mountains, 100 m/s",
             field: mountains,
             finest,
+            bounds: Some(&bounds[0]),
             camera: Box::new(over(
                 mountains,
                 low + extent * 0.3,
@@ -194,6 +217,7 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea) -> Vec<Flight
             name: "high above them, 250 m/s",
             field: mountains,
             finest,
+            bounds: Some(&bounds[0]),
             camera: Box::new(over(
                 mountains,
                 low + extent * 0.2,
@@ -207,6 +231,7 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea) -> Vec<Flight
             name: "along the coast, 50 m/s",
             field: coast,
             finest: coast.finest_level(),
+            bounds: Some(&bounds[1]),
             camera: Box::new(over(
                 coast,
                 south + size * DVec2::new(0.3, 0.35),
@@ -220,6 +245,7 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea) -> Vec<Flight
             name: "over the sea, 20 m/s",
             field: sea,
             finest: 12,
+            bounds: None,
             camera: Box::new(|t| {
                 let eye = DVec3::new(-500.0 + 20.0 * t, -800.0, 25.0);
                 (eye, eye + DVec3::new(300.0, 900.0, -120.0))

@@ -137,11 +137,9 @@ impl Quadtree {
         self.leaves.clear();
         self.index.clear();
         let bound = |cell: Cell| bound(field, metric, cell, DEPTH);
-        if self.cut.is_empty() {
-            if let Some(own) = bound(Cell::face(0)) {
-                self.index.insert(Cell::face(0), 0);
-                self.leaves.push(Leaf { cell: Cell::face(0), own, parent: f32::INFINITY, seams: 0.0, morph: 0.0 });
-            }
+        if let (true, Some(own)) = (self.cut.is_empty(), bound(Cell::face(0))) {
+            self.index.insert(Cell::face(0), 0);
+            self.leaves.push(Leaf { cell: Cell::face(0), own, parent: f32::INFINITY, seams: 0.0, morph: 0.0 });
         }
         for level in &self.levels {
             for &cell in level {

@@ -23,7 +23,7 @@ mod diamond;
 mod flight;
 mod scan;
 
-pub use bounds::NestedBounds;
+pub use bounds::{NestedBounds, TooManySamples};
 pub use flight::RoamFlight;
 pub use scan::Priority;
 

@@ -28,7 +28,7 @@ fn flights_over_prepared_land_keep_every_promise() {
         let mut side = || 2 + random.below(if small { 3 } else { 70 }) as usize;
         let (columns, rows) = (side(), side());
         let land = random_terrain(columns, rows, &mut random);
-        let bounds = NestedBounds::of(&land);
+        let bounds = NestedBounds::of(&land).expect("few samples");
         let finest = land.finest_level() - random.below(u32::from(land.finest_level()).min(2) + 1) as u8;
         let limits = Limits { finest, triangles: [300, 4_000, 20_000][random.below(3) as usize] };
         let surface = surface_of(land.clone());
@@ -53,7 +53,7 @@ fn flights_over_prepared_land_keep_every_promise() {
 fn changes_are_all_told() {
     let mut random = Random::new(12);
     let land = random_terrain(129, 129, &mut random);
-    let (bounds, surface) = (NestedBounds::of(&land), surface_of(land.clone()));
+    let (bounds, surface) = (NestedBounds::of(&land).expect("few samples"), surface_of(land.clone()));
     let limits = Limits { finest: land.finest_level(), triangles: 3_000 };
     let mut flight = RoamFlight::over(&bounds, limits);
     let (mut triangles, mut vertices) = (Vec::new(), Vec::new());

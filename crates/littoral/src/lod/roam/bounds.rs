@@ -88,10 +88,33 @@ struct Level {
     north: Vec<Bound>,
 }
 
+/// The land has more samples than a flight can name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "expected land of at most {} samples a side, got {columns} × {rows}; load it coarser, or use ROAM from scratch",
+    NestedBounds::MOST
+)]
+pub struct TooManySamples {
+    /// Columns of the raster.
+    pub columns: usize,
+    /// Its rows.
+    pub rows: usize,
+}
+
 impl NestedBounds {
+    /// The most samples a side: a flight packs places into 16 bits each.
+    pub const MOST: usize = (1 << 14) + 1;
+
     /// Measures `land`.
-    pub fn of(land: &Land) -> NestedBounds {
+    ///
+    /// # Errors
+    /// If it has more than [`NestedBounds::MOST`] samples a side.
+    pub fn of(land: &Land) -> Result<NestedBounds, TooManySamples> {
         let finest = land.finest_level();
+        let (columns, rows) = (land.raster().columns(), land.raster().rows());
+        if columns.max(rows) > NestedBounds::MOST {
+            return Err(TooManySamples { columns, rows });
+        }
         let side = (1usize << finest) + 1;
         let raster = land.raster();
         let mut heights = vec![f32::NAN; side * side];
@@ -129,7 +152,7 @@ impl NestedBounds {
                 bounds.levels[usize::from(level)].squares = squares;
             }
         }
-        bounds
+        Ok(bounds)
     }
 
     /// Bytes of memory held, heights included.

@@ -127,7 +127,7 @@ proptest! {
         let filled = |h: &f32| if flat { 7.0 } else if h.is_nan() && !holes { 0.0 } else { *h };
         let heights: Vec<f32> = heights.iter().map(filled).take(columns * rows).collect();
         let land = land(columns, rows, &heights);
-        let bounds = NestedBounds::of(&land);
+        let bounds = NestedBounds::of(&land).expect("few samples");
         let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: budget });
         if distance {
             flight.priority = Priority::InverseDistance;
@@ -174,7 +174,7 @@ proptest! {
 fn stopped_frames_catch_up() {
     let heights: Vec<f32> = (0..65 * 65).map(|i| ((i * 7919) % 101) as f32).collect();
     let land = land(65, 65, &heights);
-    let bounds = NestedBounds::of(&land);
+    let bounds = NestedBounds::of(&land).expect("few samples");
     let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: 1_500 });
     let look = |x: f64| {
         let mut view =
