@@ -69,6 +69,11 @@ impl Quadtree {
         }
     }
 
+    /// Level of the smallest patches.
+    fn deepest(&self) -> u8 {
+        self.limits.finest.min(Cell::MAX_LEVEL).saturating_sub(DEPTH)
+    }
+
     /// Marks a cell as cut.
     fn mark(&mut self, cell: Cell) -> bool {
         let new = self.cut.insert(cell);
@@ -83,7 +88,7 @@ impl Quadtree {
         self.cut.clear();
         self.levels.iter_mut().for_each(Vec::clear);
         let mut level = 0;
-        let deepest = self.limits.finest.min(Cell::MAX_LEVEL).saturating_sub(DEPTH);
+        let deepest = self.deepest();
         let wants = |cell: Cell| {
             cell.level < deepest
                 && metric
@@ -136,14 +141,18 @@ impl Quadtree {
     fn list(&mut self, field: &dyn HeightField, metric: &ScreenMetric) {
         self.leaves.clear();
         self.index.clear();
-        let bound = |cell: Cell| bound(field, metric, cell, DEPTH);
+        let plain = |cell: Cell| metric.cell(field, cell, field.stencil_error(cell, DEPTH)).map(|(_, pixels)| pixels);
+        // Nothing is finer than these, which near the eye are far smaller than the patch.
+        let bound =
+            |cell: Cell| if cell.level >= self.deepest() { bound(field, metric, cell, DEPTH) } else { plain(cell) };
         if let (true, Some(own)) = (self.cut.is_empty(), bound(Cell::face(0))) {
             self.index.insert(Cell::face(0), 0);
             self.leaves.push(Leaf { cell: Cell::face(0), own, parent: f32::INFINITY, seams: 0.0, morph: 0.0 });
         }
         for level in &self.levels {
             for &cell in level {
-                let parent = bound(cell).unwrap_or(f32::INFINITY);
+                let parent =
+                    metric.cell(field, cell, field.stencil_error(cell, DEPTH)).map_or(f32::INFINITY, |(_, p)| p);
                 for child in cell.children() {
                     if let Some(own) = bound(child).filter(|_| !self.cut.contains(&child)) {
                         self.index.insert(child, self.leaves.len() as u32);
