@@ -141,10 +141,10 @@ impl Quadtree {
     fn list(&mut self, field: &dyn HeightField, metric: &ScreenMetric) {
         self.leaves.clear();
         self.index.clear();
+        let deepest = self.deepest();
         let plain = |cell: Cell| metric.cell(field, cell, field.stencil_error(cell, DEPTH)).map(|(_, pixels)| pixels);
         // Nothing is finer than these, which near the eye are far smaller than the patch.
-        let bound =
-            |cell: Cell| if cell.level >= self.deepest() { bound(field, metric, cell, DEPTH) } else { plain(cell) };
+        let bound = |cell: Cell| if cell.level >= deepest { bound(field, metric, cell, DEPTH) } else { plain(cell) };
         if let (true, Some(own)) = (self.cut.is_empty(), bound(Cell::face(0))) {
             self.index.insert(Cell::face(0), 0);
             self.leaves.push(Leaf { cell: Cell::face(0), own, parent: f32::INFINITY, seams: 0.0, morph: 0.0 });
