@@ -20,7 +20,7 @@ pub struct Detail {
     /// How far from its place the mesh may be drawn, in pixels
     #[arg(long, value_name = "PIXELS", value_parser = input::tolerance, default_value = "1", requires = "lod", help_heading = "Mesh")]
     pub tolerance: f64,
-    /// The most triangles; where they do not do, the tolerance gives way
+    /// The most triangles of the ground, and as many of the sea; where they do not do, the tolerance gives way
     #[arg(long, value_name = "N", default_value = "2000000", value_parser = clap::value_parser!(u32).range(1..=50_000_000), requires = "lod", help_heading = "Mesh")]
     pub triangles: u32,
     /// Draw the mesh's edges, too

@@ -231,7 +231,8 @@ impl Render {
         }
 
         let mesh_view = self.detail.view(&self, &subject, &shot.view, look, talk)?;
-        let chosen = self.detail.choose(stage.land(), sea.as_ref(), &mesh_view)?;
+        let waves = sea.as_ref().filter(|_| stage.shows_waves());
+        let chosen = self.detail.choose(stage.land(), waves, &mesh_view)?;
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
         let picture = match &chosen {

@@ -1,5 +1,8 @@
 //! Meshes of whole rasters: each patch covered exactly once, and no sample farther away than was asked for.
 
+mod counting;
+
+use counting::allocations;
 use glam::DVec2;
 use littoral::field::{Raster, Window};
 use littoral::mesh::measure::{Flaw, measure, verify, verify_delaunay};
@@ -7,42 +10,6 @@ use littoral::mesh::rtin::{Rtin, Scratch};
 use littoral::mesh::tiled::{Method, Tiling};
 use littoral::mesh::{MeshError, Triangulation, tin};
 use proptest::prelude::*;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-/// The system's allocator, counting what each thread asks for.
-struct Counting;
-
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-fn allocations() -> usize {
-    COUNT.with(Cell::get)
-}
-
-// SAFETY: every call goes to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(at, layout) }
-    }
-
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: as above.
-        unsafe { System.realloc(at, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// How many random cases a property is tried on.
 fn cases(few: u32) -> ProptestConfig {

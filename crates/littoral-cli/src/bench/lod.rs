@@ -158,9 +158,8 @@ impl Lod {
                 let jumps = now.iter().zip(&then).map(|(now, then)| (now - then).abs());
                 pop = jumps.fold(pop, f32::max);
                 errors.extend(now.iter().filter(|e| !e.is_nan()).map(|e| e.abs()));
-            } else if (frame + 1) % stride == 1 % stride {
-                before.clone_from(&drawing.mesh);
             }
+            before.clone_from(&drawing.mesh);
         }
         errors.sort_by(f32::total_cmp);
         [&mut select, &mut expand].into_iter().for_each(|times| times.sort_by(f64::total_cmp));

@@ -227,7 +227,7 @@ fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
                 _ => patch.morph,
             };
             let drawn = if morph > 0.0 {
-                let (one, other) = coarse_ends(i, j);
+                let [one, other] = coarse_ends(i, j);
                 let coarse = 0.5 * (height(one.0, one.1) + height(other.0, other.1));
                 // Next to a void there may be nothing to move to.
                 if coarse.is_nan() { own } else { own + (coarse - own) * morph }
@@ -256,7 +256,7 @@ fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
     };
     let kept = |i: u32, j: u32| match missing(i, j) {
         Some(cells) if cells.iter().all(|&(i, j)| whole(i, j)) => {
-            let (before, _) = coarse_ends(i, j);
+            let [before, _] = coarse_ends(i, j);
             before.1 * side + before.0
         }
         _ => j * side + i,
@@ -287,7 +287,7 @@ fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
             // Each side, run along with the patch on the left.
             for (i, j, turned) in [(k, 0, false), (n, k, false), (k, n, true), (0, k, true)] {
                 let Some(cells) = missing(i, j) else { continue };
-                let (one, other) = coarse_ends(i, j);
+                let [one, other] = coarse_ends(i, j);
                 let ends = [one, other].map(|(i, j)| (!height(i, j).is_nan()).then_some(j * side + i));
                 if let ([Some(one), Some(other)], 1) = (ends, cells.iter().filter(|&&(i, j)| whole(i, j)).count()) {
                     let (from, to) = if turned { (other, one) } else { (one, other) };
@@ -299,14 +299,14 @@ fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
 }
 
 /// The ends of the line on which a stencil twice as coarse draws the vertex (i, j): itself if both are even.
-fn coarse_ends(i: u32, j: u32) -> ((u32, u32), (u32, u32)) {
+pub(super) fn coarse_ends(i: u32, j: u32) -> [(u32, u32); 2] {
     match (i & 1, j & 1) {
-        (0, 0) => ((i, j), (i, j)),
-        (1, 0) => ((i - 1, j), (i + 1, j)),
-        (0, _) => ((i, j - 1), (i, j + 1)),
+        (0, 0) => [(i, j), (i, j)],
+        (1, 0) => [(i - 1, j), (i + 1, j)],
+        (0, _) => [(i, j - 1), (i, j + 1)],
         // The coarse cell's diagonal runs between those of its corners that are even and odd in both directions.
-        _ if ((i >> 1) + (j >> 1)) & 1 == 0 => ((i - 1, j - 1), (i + 1, j + 1)),
-        _ => ((i + 1, j - 1), (i - 1, j + 1)),
+        _ if ((i >> 1) + (j >> 1)) & 1 == 0 => [(i - 1, j - 1), (i + 1, j + 1)],
+        _ => [(i + 1, j - 1), (i - 1, j + 1)],
     }
 }
 

@@ -106,6 +106,17 @@ impl ScreenMetric {
         Ok(ScreenMetric { datum, eye: view.eye, forward, sides, focal, stretch, tolerance: view.tolerance_pixels })
     }
 
+    /// The same for methods that work on one face only.
+    ///
+    /// # Errors
+    /// Also if `datum` is not a plane.
+    pub fn on_plane(view: &View, datum: Datum) -> Result<ScreenMetric, ViewError> {
+        match datum {
+            Datum::Plane { .. } => ScreenMetric::new(view, datum),
+            Datum::Ellipsoid { .. } => Err(ViewError::Ellipsoid),
+        }
+    }
+
     /// How wrong a drawing may be (pixels).
     pub fn tolerance(&self) -> f32 {
         self.tolerance

@@ -12,10 +12,10 @@
 //! The number of windows is what the finest needs to keep the tolerance. Where the rings do not keep it, windows of twice as many cells are
 //! tried as far as the limits allow; a drawing by rings cannot follow rough ground as others do, and its bound says so.
 
-use super::drawing::{STEPS, Vertex};
+use super::drawing::{STEPS, Vertex, coarse_ends};
 use super::{Drawing, Limits, Lod, Reached, ScreenMetric, Stencil, ViewError};
 use crate::field::HeightField;
-use crate::space::{Cell, Datum, Place, View};
+use crate::space::{Cell, Place, View};
 
 /// How a window joins the one about it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub enum Seams {
 pub struct Nested {
     /// Where it ends though the tolerance is not met.
     pub limits: Limits,
-    /// Cells along the side of a window: a multiple of four.
+    /// Cells along the side of a window at first: taken as the next power of two from 4 to 4096.
     pub cells: u32,
     /// How windows join.
     pub seams: Seams,
@@ -211,7 +211,7 @@ impl Nested {
                 for j in 0..columns {
                     for i in 0..columns {
                         if self.vertices[base + (j * columns + i) as usize] != NONE && window.depth(i, j) < zone {
-                            for (i, j) in ends(i, j) {
+                            for (i, j) in coarse_ends(i, j) {
                                 self.vertices[base + (j * columns + i) as usize] = 0;
                             }
                         }
@@ -266,7 +266,8 @@ impl Nested {
                         let slot = self.vertices[coarse_base + (y * (coarser.side + 1) + x) as usize];
                         if slot == NONE { own } else { drawing.mesh.vertices[slot as usize].height }
                     } else if depth < zone {
-                        let [one, other] = ends(i, j).map(|(i, j)| drawing.mesh.vertices[at(i, j) as usize].height);
+                        let [one, other] =
+                            coarse_ends(i, j).map(|(i, j)| drawing.mesh.vertices[at(i, j) as usize].height);
                         let coarse = 0.5 * (one + other);
                         let share = 1.0 - depth as f32 / zone as f32;
                         if coarse.is_nan() { own } else { own + (coarse - own) * share }
@@ -371,16 +372,6 @@ impl Nested {
     }
 }
 
-/// The ends of the line on which a window twice as coarse draws a vertex: itself if both are even.
-fn ends(i: u32, j: u32) -> [(u32, u32); 2] {
-    match (i & 1, j & 1) {
-        (0, 0) => [(i, j), (i, j)],
-        (1, 0) => [(i - 1, j), (i + 1, j)],
-        (0, _) => [(i, j - 1), (i, j + 1)],
-        _ => [(i - 1, j - 1), (i + 1, j + 1)],
-    }
-}
-
 impl Default for Nested {
     fn default() -> Nested {
         Nested::new(Limits::default())
@@ -389,13 +380,10 @@ impl Default for Nested {
 
 impl Lod for Nested {
     fn select(&mut self, field: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Reached, ViewError> {
-        if !matches!(field.datum(), Datum::Plane { .. }) {
-            return Err(ViewError::Ellipsoid);
-        }
-        let metric = ScreenMetric::new(view, field.datum())?;
+        let metric = ScreenMetric::on_plane(view, field.datum())?;
         drawing.clear();
         drawing.stencil = Stencil::Triangle;
-        let mut side = self.cells.max(4).next_power_of_two();
+        let mut side = self.cells.clamp(4, 4096).next_power_of_two();
         let mut pixels = self.lay(field, &metric, side);
         while pixels > metric.tolerance()
             && side < 1 << self.limits.finest.min(14)

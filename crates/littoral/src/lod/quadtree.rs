@@ -14,7 +14,7 @@
 use super::drawing::{STEPS, place};
 use super::{Drawing, Edge, Limits, Lod, Patch, Reached, ScreenMetric, Stencil, ViewError};
 use crate::field::HeightField;
-use crate::space::{Cell, Datum, Place, View};
+use crate::space::{Cell, Place, View};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Cells along a patch's side, and the levels between a patch and its cells.
@@ -251,10 +251,7 @@ impl Default for Quadtree {
 
 impl Lod for Quadtree {
     fn select(&mut self, field: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Reached, ViewError> {
-        if !matches!(field.datum(), Datum::Plane { .. }) {
-            return Err(ViewError::Ellipsoid);
-        }
-        let metric = ScreenMetric::new(view, field.datum())?;
+        let metric = ScreenMetric::on_plane(view, field.datum())?;
         drawing.clear();
         drawing.stencil = Stencil::Square(CELLS);
         let mut tolerance = metric.tolerance();

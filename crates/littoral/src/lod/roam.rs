@@ -29,7 +29,7 @@ pub use scan::Priority;
 
 use super::{Drawing, Limits, Lod, Reached, ScreenMetric, Vertex, ViewError};
 use crate::field::HeightField;
-use crate::space::{Datum, Place, View};
+use crate::space::{Place, View};
 use diamond::{Diamond, FINEST, Point, STEPS};
 use std::collections::{BinaryHeap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
@@ -223,10 +223,7 @@ impl Roam {
 
 impl Lod for Roam {
     fn select(&mut self, field: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Reached, ViewError> {
-        let metric = ScreenMetric::new(view, field.datum())?;
-        if matches!(field.datum(), Datum::Ellipsoid { .. }) {
-            return Err(ViewError::Ellipsoid);
-        }
+        let metric = ScreenMetric::on_plane(view, field.datum())?;
         drawing.clear();
         let ask = Question { field, metric, finest: self.limits.finest.min(FINEST) };
         let splits = self.refine(&ask);

@@ -36,7 +36,7 @@ pub(super) struct Drawn {
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     /// First and last column and row of pixels that a triangle may cover.
-    boxes: Vec<[u16; 4]>,
+    boxes: Vec<[u32; 4]>,
     /// Triangles by tile: where each tile's begin in `sorted`.
     starts: Vec<u32>,
     sorted: Vec<u32>,
@@ -77,10 +77,10 @@ impl Drawn {
         let triangles = mesh.triangles.clone();
         let last = view.size.saturating_sub(UVec2::ONE);
         let cover = |triangle: &[u32; 3]| cover(view, triangle.map(|i| vertices[i as usize]), last);
-        let boxes: Vec<[u16; 4]> = triangles.par_iter().map(cover).collect();
+        let boxes: Vec<[u32; 4]> = triangles.par_iter().map(cover).collect();
         let tiles = UVec2::new(view.size.x.div_ceil(TILE), view.size.y.div_ceil(TILE));
-        let touched = |cover: &[u16; 4]| {
-            let [left, right, top, bottom] = cover.map(|at| u32::from(at) / TILE);
+        let touched = |cover: &[u32; 4]| {
+            let [left, right, top, bottom] = cover.map(|at| at / TILE);
             // An empty box touches nothing.
             let none = cover[0] > cover[1] || cover[2] > cover[3];
             let rows = if none { 1..1 } else { top..bottom + 1 };
@@ -136,7 +136,7 @@ impl Drawn {
                 let from = low.max(UVec2::new(tile_x, tile_y) * TILE);
                 let to = high.min(UVec2::new(tile_x, tile_y) * TILE + (TILE - 1));
                 for &triangle in &self.sorted[self.starts[tile] as usize..self.starts[tile + 1] as usize] {
-                    let [left, right, top, bottom] = self.boxes[triangle as usize].map(u32::from);
+                    let [left, right, top, bottom] = self.boxes[triangle as usize];
                     let (x0, x1) = (left.max(from.x), right.min(to.x));
                     let (y0, y1) = (top.max(from.y), bottom.min(to.y));
                     if x0 > x1 || y0 > y1 {
@@ -247,8 +247,8 @@ pub fn mesh_errors(mesh: &Mesh, field: &dyn HeightField, view: &View) -> Vec<f32
 }
 
 /// Pixels that a triangle may cover: first and last column, first and last row.
-fn cover(view: &View, corners: [DVec3; 3], last: UVec2) -> [u16; 4] {
-    const NONE: [u16; 4] = [1, 0, 1, 0];
+fn cover(view: &View, corners: [DVec3; 3], last: UVec2) -> [u32; 4] {
+    const NONE: [u32; 4] = [1, 0, 1, 0];
     let clip = corners.map(|c| view.clip_from_eye * c.as_vec3().extend(1.0));
     let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
     let mut add = |p: glam::Vec4| {
@@ -271,7 +271,7 @@ fn cover(view: &View, corners: [DVec3; 3], last: UVec2) -> [u16; 4] {
         return NONE;
     }
     let (low, high) = (low.max(Vec2::ZERO).as_uvec2(), high.as_uvec2().min(last));
-    [low.x as u16, high.x as u16, low.y as u16, high.y as u16]
+    [low.x, high.x, low.y, high.y]
 }
 
 /// Casts rays from the eye at a mesh, all others at the exact ground.
@@ -315,7 +315,11 @@ impl Stage<'_> {
         progress: &(dyn Fn(f32) + Sync),
     ) -> Picture {
         let exact = self.land().caster(view.eye);
-        let water = meshes.water.zip(sea).map(|(mesh, sea)| Drawn::new(mesh, &sea.datum(), view));
+        let water = meshes
+            .water
+            .zip(sea)
+            .filter(|_| self.shows_waves())
+            .map(|(mesh, sea)| Drawn::new(mesh, &sea.datum(), view));
         let settings = Settings { passes: settings.passes || meshes.wireframe, ..*settings };
         let ground = meshes.ground.map(|mesh| Drawn::new(mesh, &self.land().datum(), view));
         let Some(drawn) = ground else {

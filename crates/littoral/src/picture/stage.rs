@@ -122,6 +122,11 @@ impl<'a> Stage<'a> {
         matches!(self.scene.style, Style::Tint | Style::Relief)
     }
 
+    /// Whether waves are seen at all: there is water, and the style is not that of a map.
+    pub fn shows_waves(&self) -> bool {
+        self.scene.water.is_some() && !self.is_map()
+    }
+
     /// What `view` sees. `progress` is told the fraction done, now and then, from any thread.
     pub fn render(&self, view: &View, settings: &Settings, progress: &(dyn Fn(f32) + Sync)) -> Picture {
         self.render_with(&self.ground.land.caster(view.eye), None, self.scene.sea, view, settings, progress)
@@ -153,7 +158,7 @@ impl<'a> Stage<'a> {
             eye: view.eye,
             pixel: 1.0 / view.pixels_per_radian,
             caster,
-            sea: sea.filter(|_| self.scene.water.is_some() && !self.is_map()),
+            sea: sea.filter(|_| self.shows_waves()),
             water,
         };
         // Not by whoever of the tiles asks first: the flood is parallel, and a tile that it lets in meanwhile would wait for itself.

@@ -6,6 +6,8 @@
 #![allow(missing_docs)]
 
 mod check;
+#[path = "../counting/mod.rs"]
+mod counting;
 mod memory;
 mod roam;
 

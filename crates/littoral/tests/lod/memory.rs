@@ -1,41 +1,10 @@
 //! Warm calls allocate nothing.
 
+use super::counting::allocations;
 use super::{METHODS, Random, random_land};
 use glam::{DVec2, UVec2};
 use littoral::lod::{Drawing, Limits};
 use littoral::space::View;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
-/// The system's allocator, counting what each thread asks for.
-struct Counting;
-
-thread_local! {
-    static COUNT: Cell<usize> = const { Cell::new(0) };
-}
-
-// SAFETY: every call goes to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(at, layout) }
-    }
-
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: as above.
-        unsafe { System.realloc(at, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn warm_calls_allocate_nothing() {
@@ -59,8 +28,8 @@ fn warm_calls_allocate_nothing() {
         };
         fly(&mut drawing);
         fly(&mut drawing);
-        let before = COUNT.get();
+        let before = allocations();
         fly(&mut drawing);
-        assert_eq!(COUNT.get() - before, 0, "{}: allocations on the third flight", method.name);
+        assert_eq!(allocations() - before, 0, "{}: allocations on the third flight", method.name);
     }
 }
