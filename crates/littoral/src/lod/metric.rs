@@ -177,6 +177,13 @@ impl ScreenMetric {
         self.sides.iter().all(|side| reach(*side) >= slack) && reach(self.forward) >= View::NEAR
     }
 
+    /// Whether all of the box lies within the frame, and with it every box within.
+    #[inline]
+    pub(super) fn holds(&self, bounds: &Bounds) -> bool {
+        let reach = |normal: Vec3| (normal * bounds.low).min(normal * bounds.high).element_sum();
+        self.sides.iter().all(|side| reach(*side) >= 0.0) && reach(self.forward) >= View::NEAR
+    }
+
     /// Pixels that a vertical metre covers at most, anywhere in the box and the frame. Monotone: never larger for a box within another.
     #[inline]
     pub fn pixels_per_metre(&self, bounds: &Bounds) -> f32 {
