@@ -51,6 +51,9 @@ struct Leaf {
     morph: f32,
 }
 
+/// The tolerance is first raised by this factor while it takes too many triangles.
+const STEP: f32 = 1.4;
+
 /// The cells beyond a cell's four sides: south, east, north, west.
 const SIDES: [(i32, i32); 4] = [(0, -1), (1, 0), (0, 1), (-1, 0)];
 
@@ -114,9 +117,9 @@ impl Quadtree {
         true
     }
 
-    /// Whether so many cuts leave fewer triangles than allowed.
+    /// Whether so many cuts may leave no more triangles than allowed, if no more than half of the patches are out of sight.
     fn within_budget(&self) -> bool {
-        (3 * self.cut.len() + 1) * (2 * CELLS * CELLS) as usize <= self.limits.triangles.max(512)
+        (3 * self.cut.len() + 1) * (2 * CELLS * CELLS) as usize / 2 <= self.limits.triangles.max(512)
     }
 
     /// Cuts more until neighbours differ by one level at most.
@@ -255,8 +258,8 @@ impl Lod for Quadtree {
         drawing.clear();
         drawing.stencil = Stencil::Square(CELLS);
         let mut tolerance = metric.tolerance();
-        while !self.attempt(field, &metric, tolerance) {
-            tolerance *= 1.25;
+        if !self.attempt(field, &metric, tolerance) {
+            tolerance = self.relax(field, &metric, tolerance);
         }
         if self.morphs {
             self.morph(tolerance);
@@ -277,6 +280,38 @@ impl Lod for Quadtree {
 }
 
 impl Quadtree {
+    /// Makes the attempt with the least tolerance that keeps the limit of triangles, or little more, given one that does not.
+    fn relax(&mut self, field: &dyn HeightField, metric: &ScreenMetric, tolerance: f32) -> f32 {
+        /// Halvings of the last step: to a sixth of it.
+        const FINER: u32 = 3;
+        let mut low = tolerance;
+        let mut high = low * STEP;
+        while !self.attempt(field, metric, high) {
+            (low, high) = (high, high * STEP);
+        }
+        let mut last = high;
+        for _ in 0..FINER {
+            if self.triangles() * 10 >= self.limits.triangles * 9 && last == high {
+                return high;
+            }
+            last = (low * high).sqrt();
+            if self.attempt(field, metric, last) {
+                high = last;
+            } else {
+                low = last;
+            }
+        }
+        if last != high {
+            self.attempt(field, metric, high);
+        }
+        high
+    }
+
+    /// Triangles of the patches that are listed.
+    fn triangles(&self) -> usize {
+        self.leaves.len() * (2 * CELLS * CELLS) as usize
+    }
+
     /// All but the morphing; `false` if `tolerance` takes more triangles than allowed.
     fn attempt(&mut self, field: &dyn HeightField, metric: &ScreenMetric, tolerance: f32) -> bool {
         if !self.refine(field, metric, tolerance) {
@@ -289,6 +324,9 @@ impl Quadtree {
                 return false;
             }
             self.list(field, metric);
+            if self.triangles() > self.limits.triangles.max(512) {
+                return false;
+            }
             if !self.measure_seams(field, metric, tolerance) {
                 return true;
             }
