@@ -1,4 +1,4 @@
-//! Pictures of meshes: which method of detail, how fine, and what it drew.
+//! Pictures and films of meshes: which method of detail, how fine, and what it drew.
 
 use crate::input;
 use crate::render::Render;
@@ -6,16 +6,19 @@ use crate::subject::Subject;
 use crate::talk::{Failure, Talk, tidy};
 use clap::ValueEnum;
 use glam::DVec3;
-use littoral::field::{HeightField, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, Nested, Patches, Quadtree, Reached, Roam, Whole};
-use littoral::space::View;
+use littoral::field::{HeightField, Land, Sea};
+use littoral::lod::{
+    Drawing, Limits, Lod, Mesh, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, ViewError, Whole,
+};
+use littoral::picture::Meshes;
+use littoral::space::{Datum, View};
 use std::time::Instant;
 
 /// How a mesh is chosen.
 #[derive(clap::Args, Clone, Debug)]
 pub struct Detail {
     /// Draw a mesh that this method of detail chooses, instead of the exact surface; the same light falls on it
-    #[arg(long, value_enum, value_name = "METHOD", conflicts_with = "path", help_heading = "Mesh")]
+    #[arg(long, value_enum, value_name = "METHOD", help_heading = "Mesh")]
     pub lod: Option<Method>,
     /// How far from its place the mesh may be drawn, in pixels
     #[arg(long, value_name = "PIXELS", value_parser = input::tolerance, default_value = "1", requires = "lod", help_heading = "Mesh")]
@@ -27,7 +30,7 @@ pub struct Detail {
     #[arg(long, requires = "lod", help_heading = "Mesh")]
     pub wireframe: bool,
     /// Choose the mesh for an eye at this place that looks at the same point, and look at it from --eye
-    #[arg(long, value_name = "X,Y,Z", value_parser = input::xyz, requires = "lod", help_heading = "Mesh")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = input::xyz, requires = "lod", conflicts_with = "path", help_heading = "Mesh")]
     pub lod_from: Option<DVec3>,
 }
 
@@ -59,68 +62,51 @@ impl Method {
     }
 }
 
-/// What was drawn.
-pub struct Chosen {
-    /// The ground.
-    pub ground: Mesh,
-    /// The sea, if there is one.
-    pub water: Option<Mesh>,
-    /// What is told about it.
-    pub told: Told,
+/// A method at work: picture after picture, it keeps what it can.
+pub struct Chooser<'a> {
+    detail: &'a Detail,
+    land: &'a Land,
+    ground: Box<dyn Lod>,
+    /// ROAM over prepared land, which goes on from picture to picture.
+    flight: Option<RoamFlight<'a>>,
+    ground_drawing: Drawing,
+    water: Option<Box<dyn Lod>>,
+    water_drawing: Drawing,
+    shows_water: bool,
 }
 
 /// What is told about a mesh.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Told {
-    /// Triangles of ground and sea.
+    /// Triangles of ground and sea; of a film, the most in a frame.
     pub triangles: usize,
     /// No point that is seen is farther from its place than this (pixels).
     pub bound_pixels: f32,
     /// Whether the number of triangles, not the tolerance, ended the refinement.
     pub limited: bool,
-    /// How long the choice took, without heights and picture.
+    /// How long the choice took, without picture.
     pub select_seconds: f64,
 }
 
 impl Detail {
-    /// The meshes for a view, if any are wanted.
-    pub fn choose(
-        &self,
-        ground: &littoral::field::Land,
-        sea: Option<&Sea>,
-        view: &View,
-    ) -> Result<Option<Chosen>, Failure> {
-        let Some(method) = self.lod else { return Ok(None) };
-        let view = View { tolerance_pixels: self.tolerance as f32, ..*view };
-        let mut told = Told { triangles: 0, bound_pixels: 0.0, limited: false, select_seconds: 0.0 };
-        let mut choose = |field: &dyn HeightField, finest: u8| -> Result<Mesh, Failure> {
-            let limits = Limits { finest, triangles: self.triangles as usize };
-            let mut drawing = Drawing::default();
-            let started = Instant::now();
-            let Reached { pixels, limited } = method
-                .within(limits)
-                .select(field, &view, &mut drawing)
-                .map_err(|e| Failure::Work(format!("--lod: {e}")))?;
-            told.select_seconds += started.elapsed().as_secs_f64();
-            drawing.expand(field);
-            told.triangles += drawing.mesh.triangles.len();
-            told.bound_pixels = told.bound_pixels.max(pixels);
-            told.limited |= limited;
-            Ok(drawing.mesh)
-        };
-        let ground = choose(ground, ground.finest_level())?;
-        let water = match sea {
-            Some(sea) => {
-                // No cell of water is smaller than this (m).
-                const SMALLEST: f64 = 0.25;
-                let littoral::space::Datum::Plane { size, .. } = sea.datum() else {
-                    return Err(Failure::Work("expected a sea on a plane, got one on an ellipsoid".into()));
-                };
-                Some(choose(sea, (size.max_element() / SMALLEST).log2().ceil().clamp(0.0, 30.0) as u8)?)
-            }
-            None => None,
-        };
-        Ok(Some(Chosen { ground, water, told }))
+    /// What lets ROAM go on from picture to picture over a land, if that is what is wanted and the land is not too large.
+    pub fn prepare(&self, land: &Land) -> Option<NestedBounds> {
+        (self.lod == Some(Method::Roam)).then(|| NestedBounds::of(land).ok()).flatten()
+    }
+
+    /// The method that is wanted, if any, over a land that may have been prepared.
+    pub fn chooser<'a>(&'a self, land: &'a Land, prepared: Option<&'a NestedBounds>) -> Option<Chooser<'a>> {
+        let limits = Limits { finest: land.finest_level(), triangles: self.triangles as usize };
+        Some(Chooser {
+            detail: self,
+            land,
+            ground: self.lod?.within(limits),
+            flight: prepared.map(|bounds| RoamFlight::over(bounds, limits)),
+            ground_drawing: Drawing::default(),
+            water: None,
+            water_drawing: Drawing::default(),
+            shows_water: false,
+        })
     }
 
     /// The view that the mesh is chosen for: the picture's, or another eye's on the same point.
@@ -139,7 +125,78 @@ impl Detail {
     }
 }
 
+impl Chooser<'_> {
+    /// Chooses the meshes for a view.
+    pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Told, Failure> {
+        let view = View { tolerance_pixels: self.detail.tolerance as f32, ..*view };
+        let started = Instant::now();
+        let mut told = match &mut self.flight {
+            Some(flight) => {
+                let reached = flight.update(&view, &mut || false).map_err(refused)?;
+                Told::of(reached, flight.mesh(), started)
+            }
+            None => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
+        };
+        self.shows_water = sea.is_some();
+        if let Some(sea) = sea {
+            // No cell of water is smaller than this (m).
+            const SMALLEST: f64 = 0.25;
+            let Datum::Plane { size, .. } = sea.datum() else {
+                return Err(Failure::Work("expected a sea on a plane, got one on an ellipsoid".into()));
+            };
+            let finest = (size.max_element() / SMALLEST).log2().ceil().clamp(0.0, 30.0) as u8;
+            let limits = Limits { finest, triangles: self.detail.triangles as usize };
+            let method = self.detail.lod.unwrap_or(Method::Whole);
+            let water = self.water.get_or_insert_with(|| method.within(limits));
+            let water = choose(&mut **water, sea, &view, &mut self.water_drawing)?;
+            told.triangles += water.triangles;
+            told.join(water);
+        }
+        Ok(told)
+    }
+
+    /// What was chosen last.
+    pub fn meshes(&self) -> Meshes<'_> {
+        Meshes {
+            ground: Some(self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)),
+            water: self.shows_water.then_some(&self.water_drawing.mesh),
+            wireframe: self.detail.wireframe,
+        }
+    }
+}
+
+fn refused(error: ViewError) -> Failure {
+    Failure::Work(format!("--lod: {error}"))
+}
+
+/// Draws what a method chooses of a field.
+fn choose(lod: &mut dyn Lod, field: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Told, Failure> {
+    let started = Instant::now();
+    let reached = lod.select(field, view, drawing).map_err(refused)?;
+    let mut told = Told::of(reached, &drawing.mesh, started);
+    drawing.expand(field);
+    told.triangles = drawing.mesh.triangles.len();
+    Ok(told)
+}
+
 impl Told {
+    fn of(reached: Reached, mesh: &Mesh, started: Instant) -> Told {
+        Told {
+            triangles: mesh.triangles.len(),
+            bound_pixels: reached.pixels,
+            limited: reached.limited,
+            select_seconds: started.elapsed().as_secs_f64(),
+        }
+    }
+
+    /// Also tells about another mesh, or another picture: the most triangles of any, the largest bound, all the time.
+    pub fn join(&mut self, other: Told) {
+        self.triangles = self.triangles.max(other.triangles);
+        self.bound_pixels = self.bound_pixels.max(other.bound_pixels);
+        self.limited |= other.limited;
+        self.select_seconds += other.select_seconds;
+    }
+
     /// For people.
     pub fn line(&self) -> String {
         let limited = if self.limited { ", the most allowed" } else { "" };

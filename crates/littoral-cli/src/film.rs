@@ -1,5 +1,6 @@
 //! Films: a path, and a picture for each moment of it.
 
+use crate::detail::{Chooser, Told};
 use crate::ground::System;
 use crate::subject::Subject;
 use crate::talk::{Failure, Talk, progress, seconds as shown_seconds, tidy};
@@ -52,6 +53,9 @@ struct Answer {
     seconds: f64,
     exaggeration: f64,
     datum: String,
+    /// The meshes, if such were drawn.
+    #[serde(skip_serializing_if = "Option::is_none", flatten)]
+    mesh: Option<Told>,
 }
 
 /// Where frames go.
@@ -69,12 +73,14 @@ impl Order<'_> {
         Ok(if outside { Border::Cut } else { Border::Mist })
     }
 
-    /// Draws and writes the film.
+    /// Draws and writes the film: of the surface, or of the meshes that a method chooses.
+    #[allow(clippy::too_many_arguments, reason = "what a film is of, and how it is drawn")]
     pub fn run(
         &self,
         subject: &Subject,
         stage: &Stage<'_>,
         mut sea: Option<&mut Sea>,
+        mut chooser: Option<Chooser<'_>>,
         settings: &Settings,
         started: Instant,
         talk: &mut Talk,
@@ -106,6 +112,7 @@ impl Order<'_> {
         let begin = sea.as_ref().map_or(0.0, |sea| sea.time());
         let bar = progress(frames as u64, "filming");
         let mut drawn = 0;
+        let mut mesh: Option<Told> = None;
         for frame in 1..=frames {
             let there = matches!(&sink, Sink::Folder(folder) if folder.has(frame));
             if !there {
@@ -113,7 +120,15 @@ impl Order<'_> {
                 if let Some(sea) = &mut sea {
                     sea.set_time(begin + time);
                 }
-                let picture = stage.render_sea(sea.as_deref(), &view(time, self.size), settings, &|_| {});
+                let (sea, view) = (sea.as_deref(), view(time, self.size));
+                let picture = match &mut chooser {
+                    Some(chooser) => {
+                        let told = chooser.choose(sea.filter(|_| stage.shows_waves()), &view)?;
+                        mesh.get_or_insert(Told { select_seconds: 0.0, ..told }).join(told);
+                        stage.render_meshes(&chooser.meshes(), sea, &view, settings, &|_| {})
+                    }
+                    None => stage.render_sea(sea, &view, settings, &|_| {}),
+                };
                 let pixels = picture.display(&display);
                 match &mut sink {
                     Sink::Film(film) => film.frame(&pixels)?,
@@ -147,10 +162,11 @@ impl Order<'_> {
                 seconds: elapsed,
                 exaggeration: subject.exaggeration,
                 datum: subject.datum.clone(),
+                mesh,
             });
         }
         talk.print(format!(
-            "{}: {frames} frames of {}x{}, {} s at {} a second, along {named} of {} m, in {}, exaggeration {}, {}\n",
+            "{}: {frames} frames of {}x{}, {} s at {} a second, along {named} of {} m, in {}, exaggeration {}, {}{}\n",
             out.display(),
             self.size.x,
             self.size.y,
@@ -159,7 +175,8 @@ impl Order<'_> {
             tidy(flight.length(), 0),
             shown_seconds(elapsed),
             tidy(subject.exaggeration, 2),
-            subject.datum
+            subject.datum,
+            mesh.map_or(String::new(), |told| told.line())
         ))
     }
 

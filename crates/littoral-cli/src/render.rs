@@ -1,6 +1,6 @@
 //! `littoral render`: pictures and films.
 
-use crate::detail::{Chosen, Detail, Told};
+use crate::detail::{Detail, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
@@ -10,9 +10,7 @@ use crate::waves::state as sea;
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::{Sea, coast};
-use littoral::picture::{
-    self, Border, Climate, Display, Drape, Meshes, Picture, Scene, Settings, Shot, Stage, Sun, Texture,
-};
+use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
 use littoral::space::{Ray, View};
 use littoral::waves::SeaState;
 use littoral_data::write::{self, Layer, PngPixels};
@@ -41,6 +39,7 @@ use std::time::Instant;
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
   littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4
+  littoral render dem.tif --path --lod roam --wireframe                 the same as a mesh that follows the eye
 
 A film ending in .mp4 needs ffmpeg and is written when it is complete. A film whose --out is a folder is written frame
 by frame: when interrupted, the same command goes on where it stopped.")]
@@ -227,19 +226,19 @@ impl Render {
         let mut sea = self.waves(state.as_ref(), &subject, talk)?;
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
-            return film.run(&subject, &stage, sea.as_mut(), &settings, started, talk);
+            let prepared = self.detail.prepare(stage.land());
+            let chooser = self.detail.chooser(stage.land(), prepared.as_ref());
+            return film.run(&subject, &stage, sea.as_mut(), chooser, &settings, started, talk);
         }
 
         let mesh_view = self.detail.view(&self, &subject, &shot.view, look, talk)?;
         let waves = sea.as_ref().filter(|_| stage.shows_waves());
-        let chosen = self.detail.choose(stage.land(), waves, &mesh_view)?;
+        let mut chooser = self.detail.chooser(stage.land(), None);
+        let chosen = chooser.as_mut().map(|chooser| chooser.choose(waves, &mesh_view)).transpose()?;
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
-        let picture = match &chosen {
-            Some(Chosen { ground, water, .. }) => {
-                let meshes = Meshes { ground: Some(ground), water: water.as_ref(), wireframe: self.detail.wireframe };
-                stage.render_meshes(&meshes, sea.as_ref(), &shot.view, &settings, &told)
-            }
+        let picture = match &chooser {
+            Some(chooser) => stage.render_meshes(&chooser.meshes(), sea.as_ref(), &shot.view, &settings, &told),
             None => stage.render_sea(sea.as_ref(), &shot.view, &settings, &told),
         };
         bar.finish_and_clear();
@@ -265,7 +264,7 @@ impl Render {
                 hs: sea.as_ref().map(|_| state.clone().unwrap_or_else(coast::sea_state).significant_height()),
                 time: sea.as_ref().map(Sea::time),
                 passes: passes.map(|p| p.display().to_string()),
-                mesh: chosen.map(|c| c.told),
+                mesh: chosen,
             });
         }
         let also = passes.map_or(String::new(), |p| format!(" (passes in {})", p.display()));
@@ -280,7 +279,7 @@ impl Render {
             tidy(shot.field.to_degrees(), 1),
             tidy(self.exaggeration, 2),
             subject.datum,
-            chosen.map_or(String::new(), |c| c.told.line())
+            chosen.map_or(String::new(), |told| told.line())
         ))
     }
 
@@ -309,8 +308,8 @@ impl Render {
             out: &out.file,
             folder: out.kind == Kind::Frames,
             look: format!(
-                "{:?} {:?} {:?} water {:?} sea {sea:?} time {}",
-                shot.sun, shot.air, shot.style, self.water, self.time
+                "{:?} {:?} {:?} water {:?} sea {sea:?} time {} {:?}",
+                shot.sun, shot.air, shot.style, self.water, self.time, self.detail
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,
