@@ -308,8 +308,13 @@ impl Render {
             out: &out.file,
             folder: out.kind == Kind::Frames,
             look: format!(
-                "{:?} {:?} {:?} water {:?} sea {sea:?} time {} {:?}",
-                shot.sun, shot.air, shot.style, self.water, self.time, self.detail
+                "{:?} {:?} {:?} water {:?} sea {sea:?} time {}{}",
+                shot.sun,
+                shot.air,
+                shot.style,
+                self.water,
+                self.time,
+                self.detail.lod.map_or(String::new(), |_| format!(" {:?}", self.detail))
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,

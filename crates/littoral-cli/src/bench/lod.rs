@@ -1,9 +1,14 @@
 //! `littoral bench lod`: all methods of detail along the same flights.
 
+mod counted;
+mod figure;
+
 use super::mountains;
 use crate::detail::Method;
+use crate::plot;
 use crate::talk::{Failure, Talk, progress, tidy};
 use clap::ValueEnum;
+use counted::Counted;
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::{HeightField, Land, Sea, coast};
 use littoral::lod::{Drawing, Limits, Mesh, NestedBounds, RoamFlight};
@@ -11,6 +16,7 @@ use littoral::picture::mesh_errors;
 use littoral::space::{Datum, View};
 use littoral::waves::Superposition;
 use serde::Serialize;
+use std::path::PathBuf;
 use std::time::Instant;
 
 #[derive(clap::Args)]
@@ -27,6 +33,9 @@ pub struct Lod {
     /// Frames of each flight, at 60 a second
     #[arg(long, value_name = "N", default_value = "60", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     frames: u32,
+    /// Also draw it, and how errors fall with the number of triangles: .png or .svg
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 }
 
 /// The picture that tolerances count in.
@@ -36,6 +45,10 @@ const MEASURED: u32 = 4;
 
 /// The longest that a method flies (s), errors and all.
 const LONGEST: f64 = 30.0;
+
+/// What else the tolerance is for a plot, as multiples of the one that is asked for, and for how many frames and seconds.
+const SWEEP: [f64; 3] = [0.5, 2.0, 4.0];
+const SWEPT: (u32, f64) = (4, 8.0);
 
 /// A surface and how a camera moves over it.
 struct Flight<'a> {
@@ -54,6 +67,9 @@ struct Answer {
     tolerance_pixels: f64,
     most_triangles: u32,
     flights: Vec<Row>,
+    /// The same with other tolerances, if a plot was asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    sweep: Vec<Row>,
 }
 
 /// One method on one flight.
@@ -61,8 +77,11 @@ struct Answer {
 struct Row {
     flight: &'static str,
     method: String,
+    tolerance_pixels: f64,
     triangles: usize,
     vertices: usize,
+    /// Heights that the field was asked for, in a frame; of ROAM in flight, those that changed.
+    heights_evaluated: usize,
     bound_pixels: f32,
     error_max_pixels: f32,
     error_99_pixels: f32,
@@ -72,11 +91,25 @@ struct Row {
     select_99_ms: f64,
     mesh_ms: f64,
     mesh_mb: f64,
+    /// What the drawing and the method hold after the flight, and what was prepared for it beside the land's own pyramids.
+    memory_mb: f64,
+    prepared_mb: f64,
+}
+
+impl Row {
+    /// The choice and the mesh.
+    fn frame_ms(&self) -> f64 {
+        self.select_ms + self.mesh_ms
+    }
 }
 
 impl Lod {
     /// Runs the measurement.
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
+        let kind = self.plot.as_deref().map(|file| plot::ending(file, &["png", "svg"])).transpose()?;
+        if let Some(file) = &self.plot {
+            crate::render::check_output(file, &[])?;
+        }
         let (mountains, coast) = (mountains(self.size), coast::coast());
         let datum = Datum::Plane { origin: DVec2::splat(-1500.0), size: DVec2::splat(3000.0) };
         // The sea of 2009: 16 frequencies in 8 directions.
@@ -86,12 +119,18 @@ impl Lod {
         let prepare = |land: &Land| NestedBounds::of(land).map_err(|e| Failure::Work(e.to_string()));
         let bounds = [prepare(&mountains)?, prepare(&coast)?];
         let flights = flights(&mountains, &coast, &sea, &bounds);
-        let bar = progress((flights.len() * Method::value_variants().len()) as u64, "flying");
-        let mut rows = Vec::new();
+        let runs = if self.plot.is_some() { 1 + SWEEP.len() } else { 1 };
+        let bar = progress((flights.len() * Method::value_variants().len() * runs) as u64, "flying");
+        let (mut rows, mut sweep) = (Vec::new(), Vec::new());
         for flight in &flights {
             for &method in Method::value_variants() {
-                rows.push(self.fly(flight, method)?);
+                rows.push(self.fly(flight, method, self.tolerance, self.frames, LONGEST)?);
                 bar.inc(1);
+                for factor in SWEEP.iter().filter(|_| self.plot.is_some()) {
+                    let (frames, longest) = SWEPT;
+                    sweep.push(self.fly(flight, method, self.tolerance * factor, frames.min(self.frames), longest)?);
+                    bar.inc(1);
+                }
             }
         }
         bar.finish_and_clear();
@@ -100,32 +139,38 @@ impl Lod {
             tolerance_pixels: self.tolerance,
             most_triangles: self.triangles,
             flights: rows,
+            sweep,
         };
+        if let (Some(file), Some(kind)) = (&self.plot, kind) {
+            figure::write(&answer, file, kind)?;
+            talk.note(format!("plot in {}", file.display()));
+        }
         if talk.json() { talk.print_json(answer) } else { talk.print(answer.table()) }
     }
 
-    fn fly(&self, flight: &Flight, method: Method) -> Result<Row, Failure> {
+    /// Flies a method for so many frames, and for so long (s).
+    fn fly(&self, flight: &Flight, method: Method, tolerance: f64, frames: u32, longest: f64) -> Result<Row, Failure> {
         let limits = Limits { finest: flight.finest, triangles: self.triangles as usize };
         let mut lod = method.within(limits);
         // Over land ROAM goes on from frame to frame, with the mesh in place.
         let mut roam = flight.bounds.filter(|_| method == Method::Roam).map(|bounds| RoamFlight::over(bounds, limits));
+        let prepared = flight.bounds.filter(|_| method == Method::Roam).map_or(0, NestedBounds::bytes);
         let mut drawing = Drawing::default();
         let (mut select, mut expand) = (Vec::new(), Vec::new());
         let (mut triangles, mut vertices) = (Vec::new(), Vec::new());
         let (mut bound, mut pop) = (0.0f32, 0.0f32);
         let mut errors: Vec<f32> = Vec::new();
+        let mut evaluated: Vec<usize> = Vec::new();
         let mut before = Mesh::default();
         let started = Instant::now();
-        for frame in 0..self.frames {
+        for frame in 0..frames {
             // A method that is no match for a flight is not waited for.
-            if frame > 1 && started.elapsed().as_secs_f64() > LONGEST {
+            if frame > 1 && started.elapsed().as_secs_f64() > longest {
                 break;
             }
             let (eye, target) = (flight.camera)(f64::from(frame) / 60.0);
-            let view = View {
-                tolerance_pixels: self.tolerance as f32,
-                ..View::looking_at(eye, target, 50f32.to_radians(), FRAME)
-            };
+            let view =
+                View { tolerance_pixels: tolerance as f32, ..View::looking_at(eye, target, 50f32.to_radians(), FRAME) };
             let start = Instant::now();
             let reached = match &mut roam {
                 Some(roam) => roam.update(&view, &mut || false),
@@ -141,7 +186,7 @@ impl Lod {
                 }
             }
             // The first frame comes from nothing.
-            if frame > 0 || self.frames < 3 {
+            if frame > 0 || frames < 3 {
                 select.push((chosen - start).as_secs_f64() * 1e3);
             }
             if let Some(roam) = &roam {
@@ -150,8 +195,18 @@ impl Lod {
             triangles.push(drawing.mesh.triangles.len());
             vertices.push(drawing.mesh.vertices.len());
             bound = bound.max(reached.pixels);
-            let stride = (self.frames / MEASURED).max(1);
-            if frame % stride == 1 % stride {
+            let stride = (frames / MEASURED).max(1);
+            let measured = frame % stride == 1 % stride && (frames >= MEASURED * 4 || errors.is_empty());
+            if measured {
+                evaluated.push(match &roam {
+                    Some(roam) => roam.changed_vertices().map(|range| range.len()).sum(),
+                    None => {
+                        let counted = Counted::new(flight.field);
+                        lod.select(&counted, &view, &mut drawing).map_err(|e| Failure::Work(e.to_string()))?;
+                        drawing.expand(&counted);
+                        counted.heights_asked()
+                    }
+                });
                 // Both meshes from the same eye: what moves is the change of mesh alone.
                 let now = mesh_errors(&drawing.mesh, flight.field, &view);
                 let then = mesh_errors(&before, flight.field, &view);
@@ -161,7 +216,12 @@ impl Lod {
             }
             before.clone_from(&drawing.mesh);
         }
+        // What goes when they go is what they held.
+        let held = counted::held();
+        drop((lod, roam, drawing));
+        let memory = held.saturating_sub(counted::held());
         errors.sort_by(f32::total_cmp);
+        evaluated.sort_unstable();
         [&mut select, &mut expand].into_iter().for_each(|times| times.sort_by(f64::total_cmp));
         triangles.sort_unstable();
         vertices.sort_unstable();
@@ -172,8 +232,10 @@ impl Lod {
         Ok(Row {
             flight: flight.name,
             method: format!("{method:?}").to_lowercase(),
+            tolerance_pixels: tolerance,
             triangles: triangle_count,
             vertices: vertex_count,
+            heights_evaluated: evaluated.get(evaluated.len() / 2).copied().unwrap_or(0),
             bound_pixels: bound,
             error_max_pixels: error(1.0),
             error_99_pixels: error(0.99),
@@ -183,6 +245,8 @@ impl Lod {
             select_99_ms: select[at(0.99, select.len())],
             mesh_ms: expand[half],
             mesh_mb: (vertex_count * 16 + triangle_count * 12) as f64 / 1e6,
+            memory_mb: memory as f64 / 1e6,
+            prepared_mb: prepared as f64 / 1e6,
         })
     }
 }
@@ -264,7 +328,8 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea, bounds: &'a [
 impl Answer {
     fn table(&self) -> String {
         let mut text = format!(
-            "{} x {} pixels, tolerance {} pixels, at most {} triangles; medians of the frames of each flight\n",
+            "{} x {} pixels, tolerance {} pixels, at most {} triangles; medians of the frames of each flight\n\
+             errors and bounds in pixels; heights: asked of the field in a frame; MB: what drawing and method hold\n",
             self.frame[0], self.frame[1], self.tolerance_pixels, self.most_triangles
         );
         let mut flight = "";
@@ -272,10 +337,11 @@ impl Answer {
             if row.flight != flight {
                 flight = row.flight;
                 text += &format!(
-                    "\n{flight}\n  {:<12} {:>10} {:>10} {:>8} {:>24} {:>7} {:>16} {:>8} {:>8}\n",
+                    "\n{flight}\n  {:<12} {:>10} {:>10} {:>10} {:>8} {:>24} {:>7} {:>16} {:>8} {:>8}\n",
                     "method",
                     "triangles",
                     "vertices",
+                    "heights",
                     "bound",
                     "error max 99 % mean",
                     "pop",
@@ -288,15 +354,19 @@ impl Answer {
             let three = [row.error_max_pixels, row.error_99_pixels, row.error_mean_pixels].map(number).join("  ");
             let select = format!("{}  {}", tidy(row.select_ms, 2), tidy(row.select_99_ms, 2));
             text += &format!(
-                "  {:<12} {:>10} {:>10} {:>8} {three:>24} {:>7} {select:>16} {:>8} {:>8}\n",
+                "  {:<12} {:>10} {:>10} {:>10} {:>8} {three:>24} {:>7} {select:>16} {:>8} {:>8}\n",
                 row.method,
                 row.triangles,
                 row.vertices,
+                row.heights_evaluated,
                 number(row.bound_pixels),
                 number(row.pop_pixels),
                 tidy(row.mesh_ms, 2),
-                tidy(row.mesh_mb, 1)
+                tidy(row.memory_mb, 1)
             );
+        }
+        if let Some(row) = self.flights.iter().find(|row| row.prepared_mb > 0.0) {
+            text += &format!("\nbefore the first flight {} prepares {} MB\n", row.method, tidy(row.prepared_mb, 1));
         }
         text
     }

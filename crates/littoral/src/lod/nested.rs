@@ -120,7 +120,8 @@ impl Nested {
             };
             if !more || window.level >= self.limits.finest {
                 let whole = if on_trial { 0.0 } else { judge(window).worst(rings, f32::INFINITY) };
-                return Laid { fits: true, rings, pixels: rings.max(whole) };
+                let fits = 2 * (cells + self.layers[last].count + last * side as usize) <= self.limits.triangles;
+                return Laid { fits, rings, pixels: rings.max(whole) };
             }
             let (ring, finer) = window.around(middle);
             self.layers[last].cut(ring);
