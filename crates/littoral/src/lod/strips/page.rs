@@ -93,8 +93,7 @@ impl Page {
                 break;
             }
             let cuts = self.cell.level + level < asked.finest;
-            let most = if cuts { asked.tolerance } else { f32::INFINITY };
-            worst = self.measure(asked, &mut lines, level, &cells, most).max(worst);
+            worst = self.measure(asked, &mut lines, level, &cells, cuts).max(worst);
         }
         worst
     }
@@ -112,7 +111,7 @@ impl Page {
                 some |= cells[y as usize] != 0;
             }
             if some {
-                self.measure(asked, &mut lines, level, &cells, f32::INFINITY);
+                self.measure(asked, &mut lines, level, &cells, false);
             }
         }
         self.drawn.iter_mut().zip(&self.cut).for_each(|(drawn, cut)| *drawn &= !cut);
@@ -123,10 +122,10 @@ impl Page {
         self.drawn.iter().map(|bits| bits.count_ones() as usize).sum()
     }
 
-    /// Measures the cells of a level, rows of bits: notes which are whole and may be seen, and cuts those with bounds (pixels) above `most`. The
-    /// greatest bound of the others.
-    fn measure(&mut self, asked: &Asked, lines: &mut [Line; 3], level: u8, cells: &[u64; SIDE], most: f32) -> f32 {
-        let mut worst = 0.0f32;
+    /// Measures the cells of a level, rows of bits: notes which are whole and may be seen, and, if it `cuts`, cuts those with bounds above the
+    /// tolerance. The greatest bound (pixels) of the others.
+    fn measure(&mut self, asked: &Asked, lines: &mut [Line; 3], level: u8, cells: &[u64; SIDE], cuts: bool) -> f32 {
+        let (mut worst, most) = (0.0f32, if cuts { asked.tolerance } else { f32::INFINITY });
         let side = 1usize << level;
         // Row y is judged when the row beyond it is known: a cell's bound takes the nearest of its neighbours.
         for next in 0..=side + 1 {
@@ -144,7 +143,7 @@ impl Page {
                 continue;
             }
             let [a, b, c] = [y, y + 1, y + 2].map(|line| &lines[line % 3]);
-            let judged = judge([&a.scale, &b.scale, &c.scale], &b.error, bits, most);
+            let judged = judge([&a.scale, &b.scale, &c.scale], &b.error, bits, (asked.tolerance, cuts));
             let (seen, mut above) = (judged.seen & bits, judged.above & bits);
             worst = worst.max(judged.worst);
             // What is partly void is no farther off than it is large.
@@ -228,9 +227,15 @@ struct Judged {
     worst: f32,
 }
 
-/// Judges the cells `bits` of the middle line by their errors (m) and the scale of the largest of their neighbours.
+/// Judges the cells `bits` of the middle line by their errors (m) and the scale of the largest of their neighbours; those that cannot be cut,
+/// which have no finer ones beside them, by their own and what coarser ones may add.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn judge([south, middle, north]: [&[f32; LINE]; 3], error: &[f32; LINE], bits: u64, most: f32) -> Judged {
+fn judge(
+    [south, middle, north]: [&[f32; LINE]; 3],
+    error: &[f32; LINE],
+    bits: u64,
+    (most, cuts): (f32, bool),
+) -> Judged {
     let mut judged = Judged { seen: 0, whole: 0, above: 0, worst: 0.0 };
     let mut worst = [0.0f32; LANES];
     // Lanes that hold any of them.
@@ -249,10 +254,10 @@ fn judge([south, middle, north]: [&[f32; LINE]; 3], error: &[f32; LINE], bits: u
         for i in 0..LANES {
             let larger = if nearest[i] > nearest[i + 2] { nearest[i] } else { nearest[i + 2] };
             let scale = if larger > nearest[i + 1] { larger } else { nearest[i + 1] };
-            let bound = SEAMS * error[i] * scale;
+            let bound = if cuts { SEAMS * error[i] * scale } else { error[i] * m[i + 1] + most / SEAMS };
             seen[i] = u32::from(m[i + 1] >= 0.0);
             whole[i] = u32::from(error[i] < f32::INFINITY);
-            above[i] = u32::from(bound > most);
+            above[i] = u32::from(cuts & (bound > most));
             let counts = seen[i] & whole[i] & !above[i] & asked >> i & 1;
             let bound = if counts == 1 { bound } else { 0.0 };
             worst[i] = if bound > worst[i] { bound } else { worst[i] };
