@@ -8,7 +8,8 @@ use clap::ValueEnum;
 use glam::DVec3;
 use littoral::field::{HeightField, Land, Sea};
 use littoral::lod::{
-    Drawing, Limits, Lod, Mesh, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, ViewError, Whole,
+    Drawing, Limits, Lod, Mesh, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, Strips, ViewError,
+    Whole,
 };
 use littoral::picture::Meshes;
 use littoral::space::{Datum, View};
@@ -45,6 +46,8 @@ pub enum Method {
     Quadtree,
     /// Triangles cut level by level, edges deciding
     Patches,
+    /// Strips along rows whose cells change size on the way
+    Strips,
     /// A bintree of right triangles, the worst split first
     Roam,
 }
@@ -57,6 +60,7 @@ impl Method {
             Method::Nested => Box::new(Nested::new(limits)),
             Method::Quadtree => Box::new(Quadtree::new(limits)),
             Method::Patches => Box::new(Patches::new(limits)),
+            Method::Strips => Box::new(Strips::new(limits)),
             Method::Roam => Box::new(Roam::new(limits)),
         }
     }

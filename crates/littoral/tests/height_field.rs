@@ -70,6 +70,9 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
             let Some(height) = field.height(at(u, v)) else { continue };
             let slack = slack.max(height.abs() * 8.0 * f32::EPSILON);
             assert_eq!(field.height(at(u, v)), Some(height), "asked twice");
+            let mut bulk = [f32::NAN];
+            field.heights(&[at(u, v)], &mut bulk);
+            assert_eq!(bulk, [height], "{cell:?} at ({u}, {v}): asked in bulk");
             // On its border a cell that is void, or partly so, may meet its neighbour's surface where it has none itself.
             let inside = u > 0.0 && u < 1.0 && v > 0.0 && v < 1.0;
             if !inside && (error.is_infinite() || range.is_empty()) {

@@ -239,6 +239,24 @@ impl HeightField for Land {
         }
     }
 
+    fn heights(&self, places: &[Place], heights: &mut [f32]) {
+        assert_eq!(places.len(), heights.len(), "expected as many heights as places");
+        let steps = f64::from(1u32 << self.finest);
+        let (columns, rows) = (self.raster.columns() as u32, self.raster.rows() as u32);
+        let (samples, voids) = (self.raster.heights(), self.raster.voids().any());
+        for (place, height) in places.iter().zip(heights) {
+            let at = place.uv * steps;
+            let (column, row) = (at.x as u32, at.y as u32);
+            // Vertices lie on samples: nothing to be interpolated there.
+            let on_sample = f64::from(column) == at.x && f64::from(row) == at.y && column < columns && row < rows;
+            *height = if on_sample && !voids {
+                samples[row as usize * columns as usize + column as usize]
+            } else {
+                self.height(*place).unwrap_or(f32::NAN)
+            };
+        }
+    }
+
     fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {
         self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest)).finer(&self.raster, cell, depth)
     }

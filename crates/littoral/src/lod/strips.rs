@@ -2,7 +2,7 @@
 //!
 //! The face is divided into *pages*, squares of 64 × 64 cells; those that may be seen are walked, the nearest first, each row by row, and their rows become
 //! strips whose cells change size on the way ([`walk`](self::walk)). The walk is that of M. Finch and L. Bishop as V. Kapustin, V. Eruhimov and
-//! A. Malashkina published it ("Visualization of height fields", GraphiCon 2001), with its five ways to cut a cell. Theirs decides on the level of a
+//! A. Malashkina published it (GraphiCon 2001), with its five ways to cut a cell. Theirs decides on the level of a
 //! cell while it walks, from the strip before; here the bounds decide first, for all pages at once, a bit a cell ([`page`](self::page)), so that
 //! pages can be walked in any order, by many threads, and the bound holds. Where the land goes deeper than a page, pages lie within pages.
 //!
@@ -49,8 +49,6 @@ struct Walked {
     vertices: Vec<Vertex>,
     ends: Vec<u32>,
     slivers: Vec<[Vertex; 3]>,
-    places: Vec<Place>,
-    heights: Vec<f32>,
 }
 
 /// Pages fewer than these are not worth other threads.
@@ -96,9 +94,14 @@ impl Strips {
         Strips { limits, tiers: Vec::new(), order: Vec::new(), walked: Vec::new() }
     }
 
-    /// Cuts what `tolerance` asks for, and what neighbours then need; the bound reached (pixels), or `None` if that takes more
-    /// triangles than allowed.
-    fn refine(&mut self, field: &dyn HeightField, metric: &ScreenMetric, tolerance: f32) -> Option<f32> {
+    /// Cuts what `tolerance` asks for, and what neighbours then need; the bound reached (pixels) and the number of cells, or, if that takes more
+    /// triangles than allowed, about how many cells it would have been.
+    fn refine(
+        &mut self,
+        field: &dyn HeightField,
+        metric: &ScreenMetric,
+        tolerance: f32,
+    ) -> Result<(f32, usize), usize> {
         let finest = self.limits.finest.min(Cell::MAX_LEVEL);
         let asked = Asked { field, metric, tolerance, finest };
         // Pages end at the finest level; the first takes what is left above them.
@@ -109,9 +112,9 @@ impl Strips {
             tier.clear(if i == 0 { finest - DEPTH * (tiers as u8 - 1) } else { DEPTH });
         }
         let face = Cell::face(0);
-        let mut worst = SEAMS * metric.cell(field, face, field.error(face))?.1;
+        let mut worst = SEAMS * metric.cell(field, face, field.error(face)).map_or(0.0, |(_, pixels)| pixels);
         if worst <= tolerance || finest == 0 {
-            return Some(worst);
+            return Ok((worst, 1));
         }
         self.tiers[0].page(face);
         worst = 0.0;
@@ -127,7 +130,7 @@ impl Strips {
                 for_bits(page, |cell| _ = fine.page(cell));
             }
             if 6 * cut > most {
-                return None;
+                return Err(3 * cut);
             }
         }
         self.balance();
@@ -139,7 +142,40 @@ impl Strips {
             };
             cells += tier.each(settle, |a, b| a + b).unwrap_or(0);
         }
-        (2 * cells <= self.limits.triangles).then_some(worst)
+        if 2 * cells > self.limits.triangles && cells > 4 { Err(cells) } else { Ok((worst, cells)) }
+    }
+
+    /// Refines as far as the tolerance asks and the limits allow; the bound reached (pixels).
+    fn fit(&mut self, field: &dyn HeightField, metric: &ScreenMetric) -> f32 {
+        let most = self.limits.triangles.max(8);
+        let mut least = metric.tolerance();
+        let mut fits = least;
+        let (mut pixels, mut cells) = loop {
+            match self.refine(field, metric, fits) {
+                Ok(reached) => break reached,
+                Err(cells) => {
+                    // Triangles are about as many as the inverse of the bound.
+                    least = fits;
+                    fits *= (2.0 * cells as f32 / most as f32).powf(0.7).clamp(1.1, 10.0);
+                }
+            }
+        };
+        // Not much of what is allowed is left over.
+        let mut stands = true;
+        for _ in 0..4 {
+            if fits == least || 2 * cells >= most / 8 * 7 {
+                break;
+            }
+            let middle = (least * fits).sqrt();
+            match self.refine(field, metric, middle) {
+                Ok(reached) => ((pixels, cells), fits, stands) = (reached, middle, true),
+                Err(_) => (least, stands) = (middle, false),
+            }
+        }
+        if !stands {
+            _ = self.refine(field, metric, fits);
+        }
+        pixels
     }
 
     /// Cuts more until neighbours differ by one level at most.
@@ -231,13 +267,7 @@ impl Lod for Strips {
         if metric.cell(field, Cell::face(0), 0.0).is_none() {
             return Ok(Reached { pixels: 0.0, limited: false });
         }
-        let mut tolerance = metric.tolerance();
-        let pixels = loop {
-            if let Some(pixels) = self.refine(field, &metric, tolerance) {
-                break pixels;
-            }
-            tolerance *= 1.25;
-        };
+        let pixels = self.fit(field, &metric);
         self.walk(field, &metric, view, drawing);
         Ok(Reached { pixels, limited: pixels > metric.tolerance() })
     }
@@ -267,48 +297,72 @@ impl Strips {
                 let corners = [[0, STEPS], [0, 0], [STEPS, STEPS], [STEPS, 0]];
                 drawing.mesh.vertices.extend(corners.map(|[x, y]| Vertex { x, y, face: 0, height: 0.0 }));
                 drawing.strips.push(4);
-                let walked = self.one();
-                walked.lift(field, &mut drawing.mesh.vertices);
+                lift(field, &mut drawing.mesh.vertices);
             }
             return;
         }
-        let parties = self.order.len().div_ceil(TOGETHER);
-        self.walked.resize_with(parties.max(self.walked.len()), Walked::default);
         let (tiers, order) = (&self.tiers, &self.order);
-        let work = |(walked, pages): (&mut Walked, &[(f64, u32, u32)])| {
-            walked.clear();
-            for &(_, tier, number) in pages {
-                walked.page(tiers, tier as usize, number as usize, turned);
+        if order.len() < FEW || rayon::current_num_threads() == 1 {
+            let walked = one(&mut self.walked);
+            for pages in order.chunks(TOGETHER) {
+                walked.pages(tiers, pages, turned, field, &mut drawing.mesh.vertices, &mut drawing.strips);
             }
-            walked.finish(field);
-        };
-        if self.order.len() < FEW {
-            self.walked.iter_mut().zip(order.chunks(TOGETHER)).for_each(work);
-        } else {
-            self.walked.par_iter_mut().zip(order.par_chunks(TOGETHER)).for_each(work);
+            return;
         }
+        let parties = order.len().div_ceil(TOGETHER);
+        self.walked.resize_with(parties.max(self.walked.len()), Walked::default);
+        self.walked.par_iter_mut().zip(order.par_chunks(TOGETHER)).for_each(|(walked, pages)| {
+            let (mut vertices, mut ends) = (std::mem::take(&mut walked.vertices), std::mem::take(&mut walked.ends));
+            vertices.clear();
+            ends.clear();
+            walked.pages(tiers, pages, turned, field, &mut vertices, &mut ends);
+            (walked.vertices, walked.ends) = (vertices, ends);
+        });
         for walked in &self.walked[..parties] {
             let base = drawing.mesh.vertices.len() as u32;
             drawing.mesh.vertices.extend_from_slice(&walked.vertices);
             drawing.strips.extend(walked.ends.iter().map(|end| base + end));
         }
     }
+}
 
-    fn one(&mut self) -> &mut Walked {
-        self.walked.resize_with(self.walked.len().max(1), Walked::default);
-        &mut self.walked[0]
-    }
+/// The first of those who walk.
+fn one(walked: &mut Vec<Walked>) -> &mut Walked {
+    walked.resize_with(walked.len().max(1), Walked::default);
+    &mut walked[0]
 }
 
 impl Walked {
-    fn clear(&mut self) {
-        self.vertices.clear();
-        self.ends.clear();
-        self.slivers.clear();
+    /// Walks over pages and adds what it finds.
+    fn pages(
+        &mut self,
+        tiers: &[Tier],
+        pages: &[(f64, u32, u32)],
+        turned: bool,
+        field: &dyn HeightField,
+        vertices: &mut Vec<Vertex>,
+        ends: &mut Vec<u32>,
+    ) {
+        for &(_, tier, number) in pages {
+            let begun = vertices.len();
+            self.page(tiers, [tier, number].map(|i| i as usize), turned, vertices, ends);
+            for sliver in self.slivers.drain(..) {
+                vertices.extend(sliver);
+                ends.push(vertices.len() as u32);
+            }
+            lift(field, &mut vertices[begun..]);
+        }
     }
 
     /// Walks over a page.
-    fn page(&mut self, tiers: &[Tier], tier: usize, number: usize, turned: bool) {
+    fn page(
+        &mut self,
+        tiers: &[Tier],
+        [tier, number]: [usize; 2],
+        turned: bool,
+        vertices: &mut Vec<Vertex>,
+        ends: &mut Vec<u32>,
+    ) {
         let page = &tiers[tier].pages[number];
         let Cell { x, y, level, face } = page.cell;
         let beyond = [(0i64, -1i64), (1, 0), (0, 1), (-1, 0)].map(|(i, j)| {
@@ -330,29 +384,21 @@ impl Walked {
         let step = walk::step(page);
         let side = step << page.depth;
         let corner = [x, y].map(|at| (at + u32::from(turned)) * side);
-        let Walked { rows, vertices, ends, slivers, .. } = self;
+        let Walked { rows, slivers, .. } = self;
         let begun = vertices.len();
         Walk { rows, vertices, ends, corner, turned, face: face.into(), step, pen: None, begun, slivers }.run();
     }
+}
 
-    /// Adds what closes gaps, and heights.
-    fn finish(&mut self, field: &dyn HeightField) {
-        for sliver in self.slivers.drain(..) {
-            self.vertices.extend(sliver);
-            self.ends.push(self.vertices.len() as u32);
-        }
-        let mut vertices = std::mem::take(&mut self.vertices);
-        self.lift(field, &mut vertices);
-        self.vertices = vertices;
-    }
-
-    /// Gives vertices their heights.
-    fn lift(&mut self, field: &dyn HeightField, vertices: &mut [Vertex]) {
-        self.places.clear();
-        self.places.extend(vertices.iter().map(Vertex::place));
-        self.heights.clear();
-        self.heights.resize(vertices.len(), 0.0);
-        field.heights(&self.places, &mut self.heights);
-        vertices.iter_mut().zip(&self.heights).for_each(|(vertex, &height)| vertex.height = height);
+/// Gives vertices their heights.
+fn lift(field: &dyn HeightField, vertices: &mut [Vertex]) {
+    const SOME: usize = 256;
+    let mut places = [Place { face: 0, uv: DVec2::ZERO }; SOME];
+    let mut heights = [0.0; SOME];
+    for vertices in vertices.chunks_mut(SOME) {
+        let (places, heights) = (&mut places[..vertices.len()], &mut heights[..vertices.len()]);
+        places.iter_mut().zip(vertices.iter()).for_each(|(place, vertex)| *place = vertex.place());
+        field.heights(places, heights);
+        vertices.iter_mut().zip(heights).for_each(|(vertex, height)| vertex.height = *height);
     }
 }

@@ -81,7 +81,7 @@ impl Page {
 
     /// Cuts what the bounds ask for; the greatest bound (pixels) of what is left whole.
     pub fn refine(&mut self, asked: &Asked) -> f32 {
-        let mut worst = 0.0f32;
+        let (mut worst, mut lines) = (0.0f32, [Line::default(); 3]);
         for level in 1..=self.depth {
             let mut some = false;
             let mut cells = [0; SIDE];
@@ -93,26 +93,14 @@ impl Page {
                 break;
             }
             let cuts = self.cell.level + level < asked.finest;
-            self.measure(asked, level, &cells, &mut |page, y, bits, bounds| {
-                let mut left = bits;
-                let mut cut = 0;
-                while left != 0 {
-                    let x = left.trailing_zeros() as usize;
-                    left &= left - 1;
-                    if cuts && bounds[x] > asked.tolerance {
-                        cut |= 1 << x;
-                    } else {
-                        worst = worst.max(bounds[x]);
-                    }
-                }
-                page.cut[row(level, y)] = cut;
-            });
+            worst = self.measure(asked, &mut lines, level, &cells, cuts).max(worst);
         }
         worst
     }
 
     /// Says what is drawn, after neighbours cut what they had to.
     pub fn settle(&mut self, asked: &Asked) {
+        let mut lines = [Line::default(); 3];
         for level in 1..=self.depth {
             let mut some = false;
             let mut cells = [0; SIDE];
@@ -123,7 +111,7 @@ impl Page {
                 some |= cells[y as usize] != 0;
             }
             if some {
-                self.measure(asked, level, &cells, &mut |_, _, _, _| {});
+                self.measure(asked, &mut lines, level, &cells, false);
             }
         }
         self.drawn.iter_mut().zip(&self.cut).for_each(|(drawn, cut)| *drawn &= !cut);
@@ -134,18 +122,11 @@ impl Page {
         self.drawn.iter().map(|bits| bits.count_ones() as usize).sum()
     }
 
-    /// Measures the cells of a level, rows of bits. Tells for each row which of them may be seen, and their bounds (pixels); notes
-    /// what is whole.
-    fn measure(
-        &mut self,
-        asked: &Asked,
-        level: u8,
-        cells: &[u64; SIDE],
-        tell: &mut dyn FnMut(&mut Page, u32, u64, &[f32; SIDE]),
-    ) {
+    /// Measures the cells of a level, rows of bits: notes which are whole and may be seen, and, if it `cuts`, cuts those with bounds above the
+    /// tolerance. The greatest bound (pixels) of the others.
+    fn measure(&mut self, asked: &Asked, lines: &mut [Line; 3], level: u8, cells: &[u64; SIDE], cuts: bool) -> f32 {
+        let (mut worst, most) = (0.0f32, if cuts { asked.tolerance } else { f32::INFINITY });
         let side = 1usize << level;
-        let all = u64::MAX >> (64 - side);
-        let mut lines = [Line::default(); 3];
         // Row y is judged when the row beyond it is known: a cell's bound takes the nearest of its neighbours.
         for next in 0..=side + 1 {
             // Rows are counted from the one before the page.
@@ -157,31 +138,32 @@ impl Page {
                 self.line(asked, level, next as i64 - 1, near.trailing_zeros()..64 - near.leading_zeros(), line);
             }
             let Some(y) = next.checked_sub(2) else { continue };
-            let mut bits = cells[y] & all;
+            let bits = cells[y];
             if bits == 0 {
                 continue;
             }
             let [a, b, c] = [y, y + 1, y + 2].map(|line| &lines[line % 3]);
-            let mut bounds = [0.0; SIDE];
-            judge(&a.scale, b, &c.scale, &mut bounds);
-            let mut whole = 0;
-            let mut left = bits;
+            let judged = judge([&a.scale, &b.scale, &c.scale], &b.error, bits, (asked.tolerance, cuts));
+            let (seen, mut above) = (judged.seen & bits, judged.above & bits);
+            worst = worst.max(judged.worst);
+            // What is partly void is no farther off than it is large.
+            let mut left = seen & !judged.whole;
             while left != 0 {
                 let x = left.trailing_zeros() as usize;
                 left &= left - 1;
-                if b.scale[x + 1] < 0.0 {
-                    bits &= !(1 << x);
-                } else if b.error[x + 1].is_finite() {
-                    whole |= 1 << x;
+                let cell = self.at(level, x as i64, y as i64);
+                let pixels = SEAMS * asked.metric.pixels_across(&asked.metric.bounds(cell, b.range[x + 1]));
+                if pixels > most {
+                    above |= 1 << x;
                 } else {
-                    let cell = self.at(level, x as i64, y as i64);
-                    let size = asked.metric.pixels_across(&asked.metric.bounds(cell, b.range[x + 1]));
-                    bounds[x] = SEAMS * size;
+                    above &= !(1 << x);
+                    worst = worst.max(pixels);
                 }
             }
-            self.drawn[row(level, y as u32)] |= whole;
-            tell(self, y as u32, bits, &bounds);
+            self.drawn[row(level, y as u32)] |= seen & judged.whole;
+            self.cut[row(level, y as u32)] |= above & seen;
         }
+        worst
     }
 
     fn at(&self, level: u8, x: i64, y: i64) -> Cell {
@@ -204,7 +186,9 @@ impl Page {
         let part = (from - west + 1) as usize..(to - west + 1) as usize;
         asked.field.row(first, &mut line.range[part.clone()], &mut line.error[part.clone()]);
         let lens = Lens::new(asked.metric, asked.field.datum(), first);
-        scales(&lens, &line.range[part.clone()], &mut line.scale[part]);
+        let lanes = part.start..part.start + part.len().next_multiple_of(LANES);
+        scales(&lens, &line.range[lanes.clone()], &mut line.scale[lanes.clone()]);
+        line.scale[part.end..lanes.end].fill(UNSEEN);
     }
 }
 
@@ -214,33 +198,82 @@ pub(super) const SEAMS: f32 = 2.0;
 /// A row of cells and one more on both sides.
 #[derive(Clone, Copy)]
 struct Line {
-    range: [HeightRange; SIDE + 2],
-    error: [f32; SIDE + 2],
+    range: [HeightRange; LINE],
+    error: [f32; LINE],
     /// Pixels a vertical metre covers at most; [`UNSEEN`] where nothing is seen.
-    scale: [f32; SIDE + 2],
+    scale: [f32; LINE],
 }
 
 impl Default for Line {
     fn default() -> Line {
-        Line { range: [HeightRange::EMPTY; SIDE + 2], error: [0.0; SIDE + 2], scale: [UNSEEN; SIDE + 2] }
+        Line { range: [HeightRange::EMPTY; LINE], error: [0.0; LINE], scale: [UNSEEN; LINE] }
     }
 }
 
 const UNSEEN: f32 = -1.0;
 
-/// Bounds (pixels) of the middle line's cells, with the scale of the largest of their neighbours.
+/// Cells that are measured together, and places in a line: whole lanes even from its second place on.
+const LANES: usize = 16;
+const LINE: usize = SIDE + 2 + LANES;
+
+/// What is found out about a row of cells, a bit each.
+struct Judged {
+    seen: u64,
+    /// What has a finite error.
+    whole: u64,
+    /// What has a finite bound above what was asked, or an infinite one.
+    above: u64,
+    /// The greatest bound (pixels) of what is seen, whole and not above.
+    worst: f32,
+}
+
+/// Judges the cells `bits` of the middle line by their errors (m) and the scale of the largest of their neighbours; those that cannot be cut,
+/// which have no finer ones beside them, by their own and what coarser ones may add.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn judge(south: &[f32; SIDE + 2], middle: &Line, north: &[f32; SIDE + 2], bounds: &mut [f32; SIDE]) {
-    let mut most = [0.0f32; SIDE + 2];
-    for i in 0..SIDE + 2 {
-        let larger = if south[i] > north[i] { south[i] } else { north[i] };
-        most[i] = if larger > middle.scale[i] { larger } else { middle.scale[i] };
+fn judge(
+    [south, middle, north]: [&[f32; LINE]; 3],
+    error: &[f32; LINE],
+    bits: u64,
+    (most, cuts): (f32, bool),
+) -> Judged {
+    let mut judged = Judged { seen: 0, whole: 0, above: 0, worst: 0.0 };
+    let mut worst = [0.0f32; LANES];
+    // Lanes that hold any of them.
+    let (from, to) = (bits.trailing_zeros() as usize / LANES, (63 - bits.leading_zeros() as usize) / LANES);
+    for block in from..=to {
+        let at = block * LANES;
+        let mut nearest = [0.0f32; LANES + 2];
+        let [s, m, n] = [south, middle, north].map(|line| &line[at..at + LANES + 2]);
+        for i in 0..LANES + 2 {
+            let larger = if s[i] > n[i] { s[i] } else { n[i] };
+            nearest[i] = if larger > m[i] { larger } else { m[i] };
+        }
+        let error = &error[at + 1..at + 1 + LANES];
+        let asked = (bits >> at) as u32;
+        let (mut seen, mut whole, mut above) = ([0u32; LANES], [0u32; LANES], [0u32; LANES]);
+        for i in 0..LANES {
+            let larger = if nearest[i] > nearest[i + 2] { nearest[i] } else { nearest[i + 2] };
+            let scale = if larger > nearest[i + 1] { larger } else { nearest[i + 1] };
+            let bound = if cuts { SEAMS * error[i] * scale } else { error[i] * m[i + 1] + most / SEAMS };
+            seen[i] = u32::from(m[i + 1] >= 0.0);
+            whole[i] = u32::from(error[i] < f32::INFINITY);
+            above[i] = u32::from(cuts & (bound > most));
+            let counts = seen[i] & whole[i] & !above[i] & asked >> i & 1;
+            let bound = if counts == 1 { bound } else { 0.0 };
+            worst[i] = if bound > worst[i] { bound } else { worst[i] };
+        }
+        judged.seen |= packed(&seen) << at;
+        judged.whole |= packed(&whole) << at;
+        judged.above |= packed(&above) << at;
     }
-    for i in 0..SIDE {
-        let larger = if most[i] > most[i + 2] { most[i] } else { most[i + 2] };
-        let scale = if larger > most[i + 1] { larger } else { most[i + 1] };
-        bounds[i] = SEAMS * middle.error[i + 1] * scale;
-    }
+    judged.worst = worst.into_iter().fold(0.0, f32::max);
+    judged
+}
+
+/// A bit for each number, which are 0 or 1.
+#[inline(always)]
+fn packed(flags: &[u32; LANES]) -> u64 {
+    flags.iter().enumerate().fold(0u32, |bits, (i, flag)| bits | flag << i).into()
 }
 
 /// A view and a row of cells.
@@ -347,7 +380,7 @@ mod tests {
     fn rows_are_measured_as_single_cells_are() {
         let heights = (0..70 * 41).map(|i| ((i * 7919) % 101) as f32).collect();
         let land = Land::new(Raster::new(70, 41, DVec2::new(3.0, 5.0), heights).expect("valid"));
-        for (i, eye) in [(40.0, 60.0, 130.0), (-500.0, 90.0, 20.0), (100.0, 100.0, 60.0)].into_iter().enumerate() {
+        for eye in [(40.0, 60.0, 130.0), (-500.0, 90.0, 20.0), (100.0, 100.0, 60.0)] {
             let view = View::looking_at(DVec3::from(eye), DVec3::new(90.0, 70.0, 20.0), 0.8, UVec2::new(320, 200));
             let metric = ScreenMetric::new(&view, land.datum()).expect("a view");
             for level in 3..=7u8 {
@@ -366,7 +399,7 @@ mod tests {
                             assert!((scale / exact - 1.0).abs() < 1e-3, "{cell:?}: {scale} for {exact}");
                         } else if *scale >= 0.0 {
                             // Only what touches the frame may differ.
-                            assert!(!range.is_empty(), "view {i}: {cell:?} is void and yet seen");
+                            assert!(!range.is_empty(), "from {eye:?}: {cell:?} is void and yet seen");
                         }
                     }
                 }

@@ -189,12 +189,13 @@ impl Walk<'_> {
             if same > 0 {
                 self.go_on([[x * width, below], [x * width, above]]);
                 // Both advance by a cell: (a).
-                self.vertices.reserve(2 * same as usize);
-                for column in x + 1..=x + same {
-                    let [a, b] = [below, above].map(|y| self.vertex([column * width, y]));
-                    self.vertices.push(a);
-                    self.vertices.push(b);
-                }
+                let ends = [below, above].map(|y| self.vertex([(x + 1) * width, y]));
+                let cell = self.step << (self.rows.depth - level);
+                let cell = if self.turned { cell.wrapping_neg() } else { cell };
+                self.vertices.extend((0..2 * same).map(|i| {
+                    let end = ends[(i & 1) as usize];
+                    Vertex { x: end.x.wrapping_add((i / 2).wrapping_mul(cell)), ..end }
+                }));
                 x += same;
                 self.pen = Some([[x * width, below], [x * width, above]]);
                 continue;
