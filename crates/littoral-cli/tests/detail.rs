@@ -53,11 +53,40 @@ fn a_mesh_is_drawn_within_its_tolerance() {
 }
 
 #[test]
+fn films_of_meshes_are_drawn_frame_by_frame() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let film = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        std::fs::create_dir_all(&out).expect("a folder");
+        let file = out.display().to_string();
+        let film = ["render", "--path", "orbit", "--seconds", "3", "--fps", "1", "--size", "64x36", "--samples", "1"];
+        let answer = json(&[&film[..], &["--out", &file], more].concat());
+        let frames = (1..=3).map(|i| std::fs::read(out.join(format!("frame_{i:05}.png"))).expect("a frame"));
+        (answer, frames.collect::<Vec<_>>())
+    };
+    let (exact, plain) = film("exact", &[]);
+    assert!(exact.get("triangles").is_none(), "no mesh was asked for");
+    for method in ["quadtree", "roam"] {
+        let coarse = ["--lod", method, "--tolerance", "6"];
+        let (answer, frames) = film(method, &coarse);
+        assert!(answer["bound_pixels"].as_f64().is_some_and(|p| p > 0.0 && p <= 6.0), "{method}: {answer}");
+        assert!(answer["triangles"].as_u64().is_some_and(|n| n > 10) && answer["frames_drawn"] == 3, "{answer}");
+        for (mesh, exact) in frames.iter().zip(&plain) {
+            assert_ne!(mesh, exact, "{method}: the exact picture");
+        }
+        // What is missing is drawn as if nothing had been: what came before leaves no trace.
+        std::fs::remove_file(folder.path().join(method).join("frame_00002.png")).expect("a frame");
+        let (again, repaired) = film(method, &coarse);
+        assert!(again["frames_drawn"] == 1 && repaired == frames, "{method}: {again}");
+    }
+}
+
+#[test]
 fn what_makes_no_mesh_is_refused() {
     fails(&["render", "--lod", "quadtree", "--tolerance", "0"], 2, "expected 0.001 to 1000000 pixels, got 0");
     fails(&["render", "--lod", "quadtree", "--tolerance", "nan"], 2, "expected 0.001");
     fails(&["render", "--lod", "quadtree", "--triangles", "0"], 2, "--triangles");
     fails(&["render", "--wireframe"], 2, "--lod <METHOD>");
-    fails(&["render", "--lod", "quadtree", "--path", "orbit"], 2, "cannot be used with '--path");
+    fails(&["render", "--lod", "quadtree", "--lod-from", "1,2,3", "--path", "orbit"], 2, "cannot be used with");
     fails(&["render", "--lod", "clipmap"], 2, "[possible values: whole, nested, quadtree, patches, strips, roam]");
 }

@@ -364,9 +364,9 @@ impl Answer {
                 tidy(row.mesh_ms, 2),
                 tidy(row.memory_mb, 1)
             );
-        }
-        if let Some(row) = self.flights.iter().find(|row| row.prepared_mb > 0.0) {
-            text += &format!("\nbefore the first flight {} prepares {} MB\n", row.method, tidy(row.prepared_mb, 1));
+            if row.prepared_mb > 0.0 {
+                text += &format!("  {:<12} (prepared from the land: {} MB)\n", "", tidy(row.prepared_mb, 1));
+            }
         }
         text
     }

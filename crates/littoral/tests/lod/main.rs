@@ -8,6 +8,7 @@
 mod check;
 #[path = "../counting/mod.rs"]
 mod counting;
+mod grids;
 mod memory;
 mod roam;
 

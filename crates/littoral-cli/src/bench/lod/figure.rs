@@ -180,3 +180,19 @@ fn square(canvas: &mut dyn Canvas, at: DVec2, half: f64, colour: Colour) {
     let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
     canvas.patch(&corners.map(|(x, y)| at + DVec2::new(x, y)), colour);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn axes_hold_their_numbers() {
+        assert_eq!(decades([20.0, 400.0].into_iter()), [1.0, 3.0]);
+        assert_eq!(decades([0.0, f64::NAN, 5.0].into_iter()), [0.5, 1.5], "what is no number counts for nothing");
+        assert_eq!(decades([].into_iter()), [0.0, 1.0]);
+        assert_eq!([short(-1), short(2), short(4), short(6)], ["0.1", "100", "10 k", "1 M"]);
+        let panel =
+            Panel { low: DVec2::new(10.0, 20.0), high: DVec2::new(110.0, 220.0), across: [0.0, 2.0], up: [0.0, 1.0] };
+        assert_eq!([panel.x(10.0), panel.y(1.0), panel.y(1e9)], [60.0, 220.0, 20.0]);
+    }
+}
