@@ -56,7 +56,7 @@ fn windows_are_as_many_as_is_said() {
         let mut widths: Vec<u32> = widths.filter(|width| *width > 0).collect();
         widths.sort_unstable();
         widths.dedup();
-        let finest = (1u32 << 30) / cells >> (windows - 1);
+        let finest = ((1u32 << 30) / cells) >> (windows - 1);
         assert_eq!(widths.first(), Some(&finest), "{windows} windows of {cells} cells");
         assert!(mesh.vertices.len() <= usize::from(windows) * ((cells + 1) * (cells + 1)) as usize);
     }
