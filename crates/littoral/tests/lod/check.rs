@@ -227,11 +227,14 @@ impl Sight<'_> {
         if !inside || !self.height(p).is_some_and(|h| self.seen(self.world(p, h))) {
             return false;
         }
-        let place = Place { face: 0, uv: p / STEPS };
-        !(0..=Cell::MAX_LEVEL).any(|level| {
-            let cell = Cell::containing(place, level);
-            self.field.error(cell).is_infinite()
-                && self.metric.cell(self.field, cell, f32::INFINITY).is_none_or(|(_, pixels)| pixels <= small)
+        // On a line between cells the surface may be that of either.
+        let nudges = [(0.0, 0.0), (-0.1, -0.1), (0.1, -0.1), (-0.1, 0.1), (0.1, 0.1)];
+        !nudges.into_iter().map(|(i, j)| Place { face: 0, uv: (p + DVec2::new(i, j)) / STEPS }).any(|place| {
+            (0..=Cell::MAX_LEVEL).any(|level| {
+                let cell = Cell::containing(place, level);
+                self.field.error(cell).is_infinite()
+                    && self.metric.cell(self.field, cell, f32::INFINITY).is_none_or(|(_, pixels)| pixels <= small)
+            })
         })
     }
 

@@ -286,8 +286,9 @@ struct Lens {
     /// Southern and northern side from the eye (m).
     south: f32,
     north: f32,
-    /// Height of the eye (m).
+    /// Height of the eye, and what its rounding may take (m).
     eye: f32,
+    blur: f32,
     forward: [f32; 3],
     sides: [[f32; 3]; 4],
     focal: f32,
@@ -313,6 +314,7 @@ impl Lens {
             south: (row * cell.y - rest.y) as f32,
             north: ((row + 1.0) * cell.y - rest.y) as f32,
             eye: metric.eye().z as f32,
+            blur: metric.eye().z.abs() as f32 * f32::EPSILON,
             forward: forward.to_array(),
             sides: sides.map(|side| side.to_array()),
             focal,
@@ -336,7 +338,7 @@ fn scales(lens: &Lens, ranges: &[HeightRange], scales: &mut [f32]) {
         let cell = lens.cells.wrapping_add(i as i32);
         let west = cell as f32 * lens.width - lens.rest;
         let east = cell.wrapping_add(1) as f32 * lens.width - lens.rest;
-        let (low, high) = (range.low - lens.eye, range.high - lens.eye);
+        let (low, high) = (range.low - lens.eye - lens.blur, range.high - lens.eye + lens.blur);
         let far_x = if west.abs() > east.abs() { west.abs() } else { east.abs() };
         let far_z = if low.abs() > high.abs() { low.abs() } else { high.abs() };
         let slack = SLACK * (far_x + far_y + far_z);
