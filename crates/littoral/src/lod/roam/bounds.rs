@@ -75,6 +75,7 @@ pub struct NestedBounds {
     side: usize,
     /// Heights (m), row by row; NaN where void.
     heights: Vec<f32>,
+    voids: bool,
     levels: Vec<Level>,
 }
 
@@ -130,8 +131,9 @@ impl NestedBounds {
         let (low, high) = if range.is_empty() { (0.0, 0.0) } else { (range.low, range.high) };
         let step = (high / 65_000.0 - low / 65_000.0).max(low.abs().max(high.abs()) * 1e-6).max(1e-30);
         let base = low - 2.0 * step;
+        let voids = heights.iter().any(|height| height.is_nan());
         let levels = vec![Level::default(); usize::from(finest) + 1];
-        let mut bounds = NestedBounds { datum: land.datum(), finest, base, step, side, heights, levels };
+        let mut bounds = NestedBounds { datum: land.datum(), finest, base, step, side, heights, voids, levels };
         for level in (0..=finest).rev() {
             if level < finest {
                 let n = 1usize << level;
@@ -169,6 +171,11 @@ impl NestedBounds {
     /// The level of the samples.
     pub fn finest(&self) -> u8 {
         self.finest
+    }
+
+    /// Whether any of it is void.
+    pub(super) fn voids(&self) -> bool {
+        self.voids
     }
 
     /// Height (m) of a lattice point that is a sample; NaN where void.
@@ -333,7 +340,7 @@ impl NestedBounds {
 
 /// Begins to load a line of memory.
 #[inline]
-fn prefetch<T>(what: &T) {
+pub(super) fn prefetch<T>(what: &T) {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a hint; it reads nothing that the program can see.
     unsafe {

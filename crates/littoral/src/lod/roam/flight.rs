@@ -20,17 +20,18 @@ use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
 use crate::space::{Cell, Place, View};
 use glam::DVec2;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::ops::Range;
 
+mod drawn;
+mod foresight;
+mod queues;
 #[cfg(test)]
 mod tests;
 
-const NONE: u32 = u32::MAX;
+use drawn::Changes;
+use queues::{Key, Queue};
 
-/// How far beyond the last frame's border priorities enter the queues at first.
-const BAND: f32 = 1.004;
+const NONE: u32 = u32::MAX;
 
 /// A diamond of which there is a triangle, or that is split: a cache line.
 #[derive(Clone, Copy, Debug)]
@@ -56,26 +57,6 @@ struct Record {
     kids: u8,
 }
 
-/// Order of splitting: by priority, then coarser ones first, then by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Key {
-    /// Bits of a number that is not negative: they sort like it.
-    priority: u32,
-    level: Reverse<u8>,
-    name: u64,
-    record: u32,
-}
-
-impl Key {
-    fn at(&self) -> Point {
-        [(self.name >> 32) as u32, self.name as u32]
-    }
-
-    fn number(&self) -> f32 {
-        f32::from_bits(self.priority)
-    }
-}
-
 /// ROAM over prepared land, from view to view.
 #[derive(Clone, Debug)]
 pub struct RoamFlight<'a> {
@@ -92,8 +73,8 @@ pub struct RoamFlight<'a> {
     unused: Vec<u32>,
     list: List,
     /// What may be split, above `low`; what may be merged, up to `high`.
-    splits: BinaryHeap<Key>,
-    merges: BinaryHeap<Reverse<Key>>,
+    splits: Queue,
+    merges: Queue,
     band: (f32, f32),
     tolerance: f32,
     border: f32,
@@ -112,47 +93,6 @@ pub struct RoamFlight<'a> {
     operations: (u64, u64),
 }
 
-/// Which parts of a mesh changed, in blocks.
-#[derive(Clone, Debug, Default)]
-pub struct Changes {
-    triangles: Vec<u64>,
-    vertices: Vec<u64>,
-}
-
-/// Triangles or vertices a block.
-const BLOCK: usize = 64;
-
-impl Changes {
-    #[inline]
-    fn mark(blocks: &mut Vec<u64>, at: u32) {
-        let block = at as usize / BLOCK;
-        if block / 64 >= blocks.len() {
-            blocks.resize(block / 64 + 1, 0);
-        }
-        blocks[block / 64] |= 1 << (block % 64);
-    }
-
-    fn clear(&mut self) {
-        self.triangles.fill(0);
-        self.vertices.fill(0);
-    }
-
-    fn ranges(blocks: &[u64], len: usize) -> impl Iterator<Item = Range<usize>> + '_ {
-        let marked = move |block: usize| blocks.get(block / 64).is_some_and(|word| word >> (block % 64) & 1 == 1);
-        let mut block = 0;
-        std::iter::from_fn(move || {
-            while block * BLOCK < len && !marked(block) {
-                block += 1;
-            }
-            let from = block;
-            while block * BLOCK < len && marked(block) {
-                block += 1;
-            }
-            (from < block).then(|| from * BLOCK..(block * BLOCK).min(len))
-        })
-    }
-}
-
 /// Corners of the face, the first four vertices: south-west, south-east, north-east, north-west.
 const CORNERS: [Point; 4] = [[0, 0], [STEPS, 0], [STEPS, STEPS], [0, STEPS]];
 
@@ -168,8 +108,8 @@ impl<'a> RoamFlight<'a> {
             records: Vec::new(),
             unused: Vec::new(),
             list: List::default(),
-            splits: BinaryHeap::new(),
-            merges: BinaryHeap::new(),
+            splits: Queue::default(),
+            merges: Queue::default(),
             band: (0.0, 0.0),
             tolerance: 0.0,
             border: 0.0,
@@ -273,8 +213,9 @@ impl<'a> RoamFlight<'a> {
         }
         let stopped = self.balance(stop);
         self.compact();
-        let (worst, void) = self.list.worst(self.tolerance);
-        let pixels = if void && self.priority == Priority::ScreenError { f32::INFINITY } else { worst };
+        let worst = self.list.worst();
+        let void = self.priority == Priority::ScreenError && self.bounds.voids() && self.list.any_void(self.tolerance);
+        let pixels = if void { f32::INFINITY } else { worst };
         Ok(Reached { pixels, limited: worst > self.tolerance || stopped })
     }
 
@@ -358,7 +299,7 @@ impl<'a> RoamFlight<'a> {
         let known = &mut self.records[record as usize];
         known.list = kind;
         self.list.turn(known.place, kind);
-        let priority = self.list.priority[known.place as usize];
+        let priority = self.list.priority(known.place);
         self.enqueue(record, diamond, kind, priority);
     }
 
@@ -366,11 +307,12 @@ impl<'a> RoamFlight<'a> {
         match kind {
             SPLIT if priority > self.tolerance => {
                 if priority > self.band.0 {
-                    self.splits.push(key(priority, diamond, record));
+                    self.foresee_child(record, diamond);
+                    self.splits.push(Key::new(priority, diamond, record));
                 }
                 self.ready.push(record);
             }
-            MERGE if priority <= self.band.1 => self.merges.push(Reverse(key(priority, diamond, record))),
+            MERGE if priority <= self.band.1 => self.merges.push(Key::new(priority, diamond, record).reversed()),
             _ => {}
         }
     }
@@ -381,53 +323,6 @@ impl<'a> RoamFlight<'a> {
         self.list.remove(known.place);
     }
 
-    /// Draws the triangle of a diamond on the side of one of its parents, whose vertex is `apex`.
-    fn draw(&mut self, record: u32, diamond: Diamond, side: usize, apex: u32) {
-        let known = self.records[record as usize];
-        if !known.bound.whole(side) {
-            return;
-        }
-        let [a, b] = known.ends;
-        // Clockwise by the order of the base's ends?
-        let towards = diamond.apexes()[side].expect("a triangle on this side");
-        let turned = match diamond.base {
-            Base::Rising | Base::North => towards[0] > diamond.at[0],
-            Base::Falling => towards[0] < diamond.at[0],
-            Base::East => towards[1] < diamond.at[1],
-        };
-        let triangle = if turned { [b, a, apex] } else { [a, b, apex] };
-        let owner = 2 * record + side as u32;
-        let slot = match self.freed.pop() {
-            Some(slot) => {
-                self.mesh.triangles[slot as usize] = triangle;
-                self.owners[slot as usize] = owner;
-                slot
-            }
-            None => {
-                self.mesh.triangles.push(triangle);
-                self.owners.push(owner);
-                self.owners.len() as u32 - 1
-            }
-        };
-        Changes::mark(&mut self.changed.triangles, slot);
-        self.records[record as usize].triangles[side] = slot;
-    }
-
-    /// Closes the gaps that merges left among the triangles.
-    fn compact(&mut self) {
-        self.freed.sort_unstable();
-        while let Some(slot) = self.freed.pop() {
-            let owner = self.owners.pop().expect("as many owners as triangles");
-            let triangle = self.mesh.triangles.pop().expect("freed triangles are there");
-            if (slot as usize) < self.owners.len() {
-                self.owners[slot as usize] = owner;
-                self.mesh.triangles[slot as usize] = triangle;
-                self.records[owner as usize / 2].triangles[owner as usize & 1] = slot;
-                Changes::mark(&mut self.changed.triangles, slot);
-            }
-        }
-    }
-
     /// Vertices at the apexes.
     fn apexes(&self, known: &Record, diamond: Diamond) -> [u32; 2] {
         if diamond == Diamond::ROOT {
@@ -436,9 +331,9 @@ impl<'a> RoamFlight<'a> {
         known.parents.map(|parent| if parent == NONE { NONE } else { self.records[parent as usize].triangles[0] })
     }
 
-    /// The record of a split diamond's child, if the child's other parent has made it.
-    fn met(&self, known: &Record, diamond: Diamond, child: usize) -> Option<u32> {
-        // Through a parent to the child's other parent, and how the child lies to that.
+    /// Through a parent to a child's other parent, and how the child lies to that.
+    #[inline]
+    fn beyond(&self, known: &Record, diamond: Diamond, child: usize) -> (u32, usize) {
         let (parent, other, back) = if diamond.is_square() {
             let (slot, own) = match (diamond.base, child) {
                 (Base::Rising, 0 | 1) => (0, 3),
@@ -455,10 +350,12 @@ impl<'a> RoamFlight<'a> {
             let slot = usize::from(known.parents[1] != NONE && !first);
             (known.parents[slot], other, [2, 3, 0, 1][child])
         };
-        if parent == NONE {
-            return None;
-        }
-        let other = self.records[parent as usize].children[other];
+        (self.records.get(parent as usize).map_or(NONE, |parent| parent.children[other]), back)
+    }
+
+    /// The record of a split diamond's child, if the child's other parent has made it.
+    fn met(&self, known: &Record, diamond: Diamond, child: usize) -> Option<u32> {
+        let (other, back) = self.beyond(known, diamond, child);
         let other = self.records.get(other as usize).filter(|other| other.split)?;
         Some(other.children[back]).filter(|&child| child != NONE)
     }
@@ -568,138 +465,6 @@ impl<'a> RoamFlight<'a> {
             }
         }
     }
-
-    /// From scratch: splits by thresholds that fall towards where the budget ends, without a queue.
-    fn descend(&mut self) {
-        let budget = self.limits.triangles;
-        let mut above = f32::INFINITY;
-        loop {
-            self.ready.clear();
-            self.list.within(SPLIT, 0.0, f32::INFINITY, &mut self.found);
-            let worst = self.found.iter().map(|&place| self.list.priority[place as usize]).fold(0.0, f32::max);
-            if worst <= self.tolerance || self.triangles >= budget {
-                break;
-            }
-            // Triangles are about as many as the inverse of the bound; rather too few steps than one too far.
-            let share = self.triangles as f32 / budget as f32;
-            above = (above.min(worst) * (1.1 * share).clamp(0.3, 0.97)).max(self.tolerance);
-            self.list.within(SPLIT, above, f32::INFINITY, &mut self.found);
-            self.ready.extend(self.found.iter().map(|&place| self.list.record(place)));
-            while let Some(record) = self.ready.pop() {
-                let known = &self.records[record as usize];
-                if known.list == SPLIT && self.list.priority[known.place as usize] > above {
-                    self.split(record);
-                }
-                if self.triangles >= budget {
-                    break;
-                }
-            }
-        }
-        self.border = above;
-    }
-
-    /// Whether a key is still true.
-    fn valid(&self, key: &Key, list: u8) -> bool {
-        let known = &self.records[key.record as usize];
-        known.list == list && known.at == key.at() && self.list.priority[known.place as usize].to_bits() == key.priority
-    }
-
-    /// Makes the band wider and takes what it holds into the queues.
-    fn widen(&mut self, low: f32, high: f32) {
-        let (low, high) = (low.min(self.band.0), high.max(self.band.1));
-        let key_of = |list: &List, records: &[Record], place: u32| {
-            let record = list.record(place);
-            key(list.priority[place as usize], Diamond::at(records[record as usize].at), record)
-        };
-        if low < self.band.0 {
-            self.list.within(SPLIT, low.max(self.tolerance), self.band.0, &mut self.found);
-            for &place in &self.found {
-                let key = key_of(&self.list, &self.records, place);
-                if key.number() > self.border {
-                    self.bounds.expect(Diamond::at(key.at()));
-                }
-                self.splits.push(key);
-            }
-        }
-        if high > self.band.1 {
-            self.list.within(MERGE, self.band.1, high, &mut self.found);
-            self.merges.extend(self.found.iter().map(|&place| Reverse(key_of(&self.list, &self.records, place))));
-        }
-        self.band = (low, high);
-    }
-
-    /// Splits and merges until the queues agree; whether it was stopped.
-    fn balance(&mut self, stop: &mut dyn FnMut() -> bool) -> bool {
-        let (budget, tolerance) = (self.limits.triangles.max(2), self.tolerance);
-        let border = self.border.max(tolerance);
-        self.widen((border / BAND).max(tolerance), (border * BAND).max(tolerance));
-        let mut wider = BAND;
-        let mut steps = 0u32;
-        let mut stopped = false;
-        loop {
-            self.ready.clear();
-            steps += 1;
-            if steps.is_multiple_of(16) && stop() {
-                stopped = true;
-                break;
-            }
-            while self.splits.peek().is_some_and(|top| !self.valid(top, SPLIT)) {
-                self.splits.pop();
-            }
-            while self.merges.peek().is_some_and(|last| !self.valid(&last.0, MERGE)) {
-                self.merges.pop();
-            }
-            let (top, last) = (self.splits.peek().copied(), self.merges.peek().map(|last| last.0));
-            let merging = match (top, last) {
-                // Nothing is split that need not be.
-                (_, Some(last)) if last.number() <= tolerance => true,
-                _ if self.triangles > budget => true,
-                (Some(top), _) => {
-                    let known = &self.records[top.record as usize];
-                    if self.triangles + cost(known, Diamond::at(known.at)) <= budget {
-                        self.splits.pop();
-                        self.split(top.record);
-                        continue;
-                    }
-                    match last {
-                        Some(last) if last < top => true,
-                        Some(_) => break,
-                        None if top.number() > self.band.1 => true,
-                        None => break,
-                    }
-                }
-                (None, last) => {
-                    // Is there anything below the band, for which there is room or something lower to be merged?
-                    let full = self.triangles + 1 > budget;
-                    if self.band.0 <= tolerance || full && last.is_none_or(|last| last.number() > self.band.0) {
-                        break;
-                    }
-                    wider *= wider;
-                    let low = if wider.is_finite() { self.band.0 / wider } else { 0.0 };
-                    self.widen(low.max(tolerance), self.band.1);
-                    continue;
-                }
-            };
-            if merging {
-                match last {
-                    Some(last) => {
-                        self.merges.pop();
-                        self.merge(last.record);
-                    }
-                    None if self.band.1 == f32::INFINITY => break,
-                    None => {
-                        wider *= wider;
-                        let high =
-                            if wider.is_finite() { self.band.1.max(f32::MIN_POSITIVE) * wider } else { f32::INFINITY };
-                        self.widen(self.band.0, high);
-                    }
-                }
-            }
-        }
-        let next = self.splits.peek().map(Key::number).or(self.merges.peek().map(|last| last.0.number()));
-        self.border = next.unwrap_or(border).max(tolerance);
-        stopped
-    }
 }
 
 /// How many triangles a split adds.
@@ -710,8 +475,4 @@ fn cost(record: &Record, diamond: Diamond) -> usize {
 /// Whether a diamond has one triangle only.
 fn at_border(diamond: Diamond) -> bool {
     diamond.at.iter().any(|&c| c == 0 || c == STEPS)
-}
-
-fn key(priority: f32, diamond: Diamond, record: u32) -> Key {
-    Key { priority: priority.to_bits(), level: Reverse(diamond.level()), name: diamond.name(), record }
 }

@@ -14,7 +14,7 @@ fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
     let mut leaves: Vec<(Diamond, usize)> = vec![(Diamond::ROOT, 0), (Diamond::ROOT, 1)];
     loop {
         let splittable = leaves.iter().filter(|(d, _)| flight.idle(*d) == SPLIT && number(*d) > flight.tolerance);
-        let top = splittable.max_by_key(|(d, _)| key(number(*d), *d, 0)).copied();
+        let top = splittable.max_by_key(|(d, _)| Key::new(number(*d), *d, 0)).copied();
         let Some((top, _)) = top else { break };
         // What must be split with it: parents of parents, as far as they are not.
         let mut forced = vec![top];

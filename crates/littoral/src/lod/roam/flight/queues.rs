@@ -1,0 +1,241 @@
+//! The two queues: what is split and what is merged next, and when they agree.
+
+use super::*;
+use std::collections::BinaryHeap;
+
+/// How far beyond the last frame's border priorities enter the queues at first.
+const BAND: f32 = 1.004;
+
+/// Order of splitting in one number: from the highest bit the priority (bits of a number that is not negative sort like it), 32; how coarse it is, 6; its
+/// name, 31 a coordinate; the record, 28.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Key(u128);
+
+impl Key {
+    pub fn new(priority: f32, diamond: Diamond, record: u32) -> Key {
+        let [x, y] = diamond.at.map(u128::from);
+        let coarse = u128::from(63 - diamond.level());
+        Key(u128::from(priority.to_bits()) << 96 | coarse << 90 | x << 59 | y << 28 | u128::from(record))
+    }
+
+    /// The key in the order of merging: what is split last is merged first.
+    pub fn reversed(self) -> Key {
+        Key(!self.0)
+    }
+
+    pub fn at(self) -> Point {
+        [(self.0 >> 59) as u32 & 0x7fff_ffff, (self.0 >> 28) as u32 & 0x7fff_ffff]
+    }
+
+    pub fn record(self) -> u32 {
+        self.0 as u32 & 0xfff_ffff
+    }
+
+    pub fn number(self) -> f32 {
+        f32::from_bits((self.0 >> 96) as u32)
+    }
+}
+
+/// Greatest first. Most of what a frame changes is known when it begins, lies sorted, and can be seen coming; the rest is in a heap.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Queue {
+    /// In rising order.
+    sorted: Vec<Key>,
+    later: BinaryHeap<Key>,
+}
+
+impl Queue {
+    pub fn clear(&mut self) {
+        self.sorted.clear();
+        self.later.clear();
+    }
+
+    pub fn push(&mut self, key: Key) {
+        self.later.push(key);
+    }
+
+    /// Adds many.
+    fn extend(&mut self, keys: impl Iterator<Item = Key>) {
+        self.sorted.extend(keys);
+        self.sorted.sort_unstable();
+    }
+
+    fn peek(&self) -> Option<Key> {
+        self.sorted.last().copied().max(self.later.peek().copied())
+    }
+
+    fn pop(&mut self) {
+        if self.later.peek() > self.sorted.last() {
+            self.later.pop();
+        } else {
+            self.sorted.pop();
+        }
+    }
+
+    /// What comes `steps` after the next, as far as that is known.
+    fn coming(&self, steps: usize) -> Option<Key> {
+        self.sorted.len().checked_sub(1 + steps).map(|at| self.sorted[at])
+    }
+}
+
+impl RoamFlight<'_> {
+    /// From scratch: splits by thresholds that fall towards where the budget ends, without a queue.
+    pub(super) fn descend(&mut self) {
+        let budget = self.limits.triangles;
+        let mut above = f32::INFINITY;
+        loop {
+            self.ready.clear();
+            self.list.within(SPLIT, 0.0, f32::INFINITY, &mut self.found);
+            let worst = self.found.iter().map(|&place| self.list.priority(place)).fold(0.0, f32::max);
+            if worst <= self.tolerance || self.triangles >= budget {
+                break;
+            }
+            // Triangles are about as many as the inverse of the bound; rather too few steps than one too far.
+            let share = self.triangles as f32 / budget as f32;
+            above = (above.min(worst) * (1.1 * share).clamp(0.3, 0.97)).max(self.tolerance);
+            self.list.within(SPLIT, above, f32::INFINITY, &mut self.found);
+            self.ready.extend(self.found.iter().map(|&place| self.list.record(place)));
+            while let Some(record) = self.ready.pop() {
+                let known = &self.records[record as usize];
+                if known.list == SPLIT && self.list.priority(known.place) > above {
+                    self.split(record);
+                }
+                if self.triangles >= budget {
+                    break;
+                }
+            }
+        }
+        self.border = above;
+    }
+
+    /// Whether a key is still true.
+    fn valid(&self, key: Key, list: u8) -> bool {
+        let known = &self.records[key.record() as usize];
+        known.list == list && known.at == key.at() && self.list.priority(known.place) == key.number()
+    }
+
+    /// Makes the band wider and takes what it holds into the queues.
+    fn widen(&mut self, low: f32, high: f32) {
+        let (low, high) = (low.min(self.band.0), high.max(self.band.1));
+        let (list, shift) = (&self.list, self.shift());
+        let key = |&place: &u32| {
+            let at = list.middle(place).map(|c| c << shift);
+            Key::new(list.priority(place), Diamond::at(at), list.record(place))
+        };
+        if low < self.band.0 {
+            list.within(SPLIT, low.max(self.tolerance), self.band.0, &mut self.found);
+            self.splits.extend(self.found.iter().map(key));
+        }
+        if high > self.band.1 {
+            list.within(MERGE, self.band.1, high, &mut self.found);
+            self.merges.extend(self.found.iter().map(|place| key(place).reversed()));
+        }
+        self.band = (low, high);
+    }
+
+    /// The next that is to be split, and the next that is to be merged.
+    fn next(&mut self) -> (Option<Key>, Option<Key>) {
+        let (mut top, mut last) = (self.splits.peek(), self.merges.peek());
+        while top.is_some_and(|top| !self.valid(top, SPLIT)) {
+            self.splits.pop();
+            top = self.splits.peek();
+        }
+        while last.is_some_and(|last| !self.valid(last.reversed(), MERGE)) {
+            self.merges.pop();
+            last = self.merges.peek();
+        }
+        (top, last.map(Key::reversed))
+    }
+
+    /// Splits and merges until the queues agree; whether it was stopped.
+    pub(super) fn balance(&mut self, stop: &mut dyn FnMut() -> bool) -> bool {
+        let (budget, tolerance) = (self.limits.triangles.max(2), self.tolerance);
+        let border = self.border.max(tolerance);
+        self.widen((border / BAND).max(tolerance), (border * BAND).max(tolerance));
+        let mut wider = BAND;
+        let mut steps = 0u32;
+        let mut stopped = false;
+        loop {
+            self.ready.clear();
+            steps += 1;
+            if steps.is_multiple_of(16) && stop() {
+                stopped = true;
+                break;
+            }
+            let (top, last) = self.next();
+            let merging = match (top, last) {
+                // Nothing is split that need not be.
+                (_, Some(last)) if last.number() <= tolerance => true,
+                _ if self.triangles > budget => true,
+                (Some(top), _) => {
+                    let known = &self.records[top.record() as usize];
+                    if self.triangles + cost(known, Diamond::at(known.at)) <= budget {
+                        self.splits.pop();
+                        self.foresee_splits();
+                        self.split(top.record());
+                        continue;
+                    }
+                    match last {
+                        Some(last) if last < top => true,
+                        Some(_) => break,
+                        None if top.number() > self.band.1 => true,
+                        None => break,
+                    }
+                }
+                (None, last) => {
+                    // Is there anything below the band, for which there is room or something lower to be merged?
+                    let full = self.triangles + 1 > budget;
+                    if self.band.0 <= tolerance || full && last.is_none_or(|last| last.number() > self.band.0) {
+                        break;
+                    }
+                    wider *= wider;
+                    let low = if wider.is_finite() { self.band.0 / wider } else { 0.0 };
+                    self.widen(low.max(tolerance), self.band.1);
+                    continue;
+                }
+            };
+            if merging {
+                match last {
+                    Some(last) => {
+                        self.merges.pop();
+                        self.foresee_merges();
+                        self.merge(last.record());
+                    }
+                    None if self.band.1 == f32::INFINITY => break,
+                    None => {
+                        wider *= wider;
+                        let high =
+                            if wider.is_finite() { self.band.1.max(f32::MIN_POSITIVE) * wider } else { f32::INFINITY };
+                        self.widen(self.band.0, high);
+                    }
+                }
+            }
+        }
+        let (top, last) = self.next();
+        self.border = top.or(last).map_or(border, Key::number).max(tolerance);
+        stopped
+    }
+
+    /// Begins to load what the coming splits will ask for, one hop of the chain at a time.
+    #[inline]
+    fn foresee_splits(&self) {
+        for hop in 0..4 {
+            if let Some(key) = self.splits.coming(AHEAD[hop]) {
+                self.foresee_split(key.record(), hop);
+            }
+        }
+    }
+
+    /// The same for merges.
+    #[inline]
+    fn foresee_merges(&self) {
+        for hop in 0..3 {
+            if let Some(key) = self.merges.coming(AHEAD[hop]) {
+                self.foresee_merge(key.reversed().record(), hop);
+            }
+        }
+    }
+}
+
+/// How many steps before its turn each hop of the chain from a record to its neighbours is loaded.
+const AHEAD: [usize; 4] = [12, 9, 6, 3];
