@@ -29,6 +29,11 @@ fn main() {
         bounds.bytes() as f64 / land.raster().heights().len() as f64
     );
     if std::env::var("DEV").is_ok() {
+        if let Ok(case) = std::env::var("CASE") {
+            let v: Vec<f64> = case.split(',').map(|x| x.parse().unwrap()).collect();
+            flight(&bounds, &land, v[0] as usize, &case, (v[1], v[2]), v[3] as usize, f64::INFINITY);
+            return;
+        }
         for (n,f) in [(5000,2000),(20000,1000),(100_000,600), (1_000_000, 60)] {
             for s in [0.0, 1000.0, 3000.0] {
             flight(&bounds, &land, n, &format!("{n} {s} m/s"), (s, 0.0), f, f64::INFINITY);

@@ -196,7 +196,7 @@ impl NestedBounds {
         let level = diamond.cell_level();
         let of = &self.levels[usize::from(level)];
         let n = 1usize << level;
-        let [i, j] = diamond.at.map(|c| (c >> (Cell::MAX_LEVEL - level)) as usize);
+        let [i, j] = [0, 1].map(|i| (diamond.at[i] >> (Cell::MAX_LEVEL - level)) as usize);
         match diamond.base {
             Base::Rising | Base::Falling => &of.squares[j * n + i],
             Base::East => &of.east[j * n + i],

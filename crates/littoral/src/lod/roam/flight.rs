@@ -192,7 +192,7 @@ impl<'a> RoamFlight<'a> {
         let metric = ScreenMetric::new(view, self.bounds.datum())?;
         let steps = f64::from(STEPS >> self.shift());
         let heights = (self.bounds.base, self.bounds.step);
-        self.lens = Some(Lens::new(&metric, self.bounds.datum(), steps, heights, self.priority));
+        self.lens = Some(Lens::new(&metric, self.bounds.datum(), steps, heights, self.priority, self.bounds.voids()));
         self.tolerance = match self.priority {
             Priority::ScreenError => metric.tolerance(),
             Priority::InverseDistance => 0.0,
@@ -307,12 +307,15 @@ impl<'a> RoamFlight<'a> {
         match kind {
             SPLIT if priority > self.tolerance => {
                 if priority > self.band.0 {
-                    self.foresee_child(record, diamond);
+                    self.foresee_child(record);
                     self.splits.push(Key::new(priority, diamond, record));
                 }
                 self.ready.push(record);
             }
-            MERGE if priority <= self.band.1 => self.merges.push(Key::new(priority, diamond, record).reversed()),
+            MERGE if priority <= self.band.1 => {
+                self.foresee_merge(record, 1);
+                self.merges.push(Key::new(priority, diamond, record).reversed());
+            }
             _ => {}
         }
     }
@@ -390,27 +393,24 @@ impl<'a> RoamFlight<'a> {
             }
         }
         let apexes = self.apexes(&known, diamond);
-        let (points, ends) = (diamond.apexes(), diamond.ends());
         for (i, child) in diamond.children().into_iter().enumerate() {
             let Some(child) = child else { continue };
-            let found = self.met(&known, diamond, i);
-            let of = found.unwrap_or_else(|| {
-                let vertex = |end: Point| match end {
-                    _ if end == ends[0] => known.ends[0],
-                    _ if end == ends[1] => known.ends[1],
-                    _ if Some(end) == points[0] => apexes[0],
-                    _ => apexes[1],
-                };
-                let ends = child.ends().map(vertex);
-                self.record(child, ends)
-            });
-            let side = usize::from(child.apexes()[0] != Some(diamond.at));
+            let ends = child_ends(diamond, known.ends, apexes, i);
+            let of = match self.met(&known, diamond, i) {
+                Some(of) => of,
+                None => self.record(child, ends),
+            };
+            let border = at_border(child);
+            let side = if border { 0 } else { side_of_parent(diamond, i) };
             self.records[record as usize].children[i] = of;
             let held = &mut self.records[of as usize];
             held.parents[side] = record;
             held.held += 1;
-            let complete = held.held == if at_border(child) { 1 } else { 2 };
-            self.draw(of, child, side, slot);
+            let complete = held.held == if border { 1 } else { 2 };
+            if held.bound.whole(side) {
+                let [a, b] = ends;
+                self.put(of, side, if i < 2 { [a, b, slot] } else { [b, a, slot] });
+            }
             if complete {
                 let list = self.idle(child);
                 self.join(of, list);
@@ -464,6 +464,38 @@ impl<'a> RoamFlight<'a> {
                 }
             }
         }
+    }
+}
+
+/// Which parent of its child a diamond is, but at the border of the face.
+#[inline]
+fn side_of_parent(diamond: Diamond, child: usize) -> usize {
+    usize::from(if diamond.is_square() { child >= 2 } else { child == 1 || child == 2 })
+}
+
+/// The ends of a child's base: one of its parent's ends, and one of its apexes.
+#[inline]
+fn child_ends(diamond: Diamond, ends: [u32; 2], apexes: [u32; 2], child: usize) -> [u32; 2] {
+    let [a, b] = ends;
+    let [p, q] = apexes;
+    match (diamond.base, child) {
+        (Base::Rising, 0) => [a, p],
+        (Base::Rising, 1) => [p, b],
+        (Base::Rising, 2) => [q, b],
+        (Base::Rising, _) => [a, q],
+        (Base::Falling, 0) => [q, b],
+        (Base::Falling, 1) => [b, p],
+        (Base::Falling, 2) => [a, p],
+        (Base::Falling, _) => [q, a],
+        // At the border there is one apex only, whichever side it is on.
+        (Base::East, 0) => [a, if q == NONE { p } else { q }],
+        (Base::East, 1) => [if q == NONE { p } else { q }, b],
+        (Base::East, 2) => [p, b],
+        (Base::East, _) => [a, p],
+        (Base::North, 0) => [p, a],
+        (Base::North, 1) => [a, if q == NONE { p } else { q }],
+        (Base::North, 2) => [b, if q == NONE { p } else { q }],
+        (Base::North, _) => [p, b],
     }
 }
 

@@ -38,6 +38,8 @@ pub(super) struct Lens {
     focal: f32,
     stretch: f32,
     priority: Priority,
+    /// Whether anything may be void.
+    voids: bool,
 }
 
 impl Lens {
@@ -48,6 +50,7 @@ impl Lens {
         steps: f64,
         heights: (f32, f32),
         priority: Priority,
+        voids: bool,
     ) -> Lens {
         let (forward, sides, focal, stretch) = metric.lens();
         let (origin, size) = match datum {
@@ -70,6 +73,7 @@ impl Lens {
             focal,
             stretch,
             priority,
+            voids,
         }
     }
 
@@ -77,8 +81,8 @@ impl Lens {
     pub(super) fn priority(&self, item: &Item) -> f32 {
         let Item { at, heights, deviation, word } = *item;
         match self.priority {
-            Priority::ScreenError => priority::<true>(self, at, heights, deviation, word),
-            Priority::InverseDistance => priority::<false>(self, at, heights, deviation, word),
+            Priority::ScreenError => priority::<true, true>(self, at, heights, deviation, word),
+            Priority::InverseDistance => priority::<false, true>(self, at, heights, deviation, word),
         }
     }
 }
@@ -188,6 +192,16 @@ impl List {
         }
     }
 
+    /// Begins to load places that entries will soon be added at.
+    #[inline]
+    pub(super) fn expect_room(&self) {
+        for depth in 3..6 {
+            if let Some(&place) = self.left.iter().nth_back(depth) {
+                self.expect(place);
+            }
+        }
+    }
+
     /// Records of all places, left ones included.
     #[cfg(test)]
     pub(super) fn word_records(&self) -> impl Iterator<Item = u32> + '_ {
@@ -198,6 +212,7 @@ impl List {
     pub(super) fn measure(&mut self, lens: &Lens, part: std::ops::Range<usize>) {
         let (items, out) = (&self.items[part.clone()], &mut self.numbers[part]);
         match lens.priority {
+            Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
             Priority::ScreenError => measure_errors(lens, items, out),
             Priority::InverseDistance => measure_distances(lens, items, out),
         }
@@ -228,19 +243,24 @@ const LANES: usize = 16;
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn measure_errors(lens: &Lens, items: &[Item], out: &mut [f32]) {
-    measure::<true>(lens, items, out);
+    measure::<true, false>(lens, items, out);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn measure_errors_and_voids(lens: &Lens, items: &[Item], out: &mut [f32]) {
+    measure::<true, true>(lens, items, out);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn measure_distances(lens: &Lens, items: &[Item], out: &mut [f32]) {
-    measure::<false>(lens, items, out);
+    measure::<false, false>(lens, items, out);
 }
 
 #[inline(always)]
-fn measure<const ERRORS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
+fn measure<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
     let lens = *lens;
     for (out, &Item { at, heights, deviation, word }) in out.iter_mut().zip(items) {
-        *out = marked(priority::<ERRORS>(&lens, at, heights, deviation, word), word);
+        *out = marked(priority::<ERRORS, VOIDS>(&lens, at, heights, deviation, word), word);
     }
 }
 
@@ -262,7 +282,7 @@ fn most(a: f32, b: f32) -> f32 {
 
 /// The priority of an [`Item`].
 #[inline(always)]
-fn priority<const ERRORS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f32, word: u32) -> f32 {
+fn priority<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f32, word: u32) -> f32 {
     let (x, y) = ((at & 0xffff) as i32, (at >> 16) as i32);
     let half = ((2 + (word >> 2 & 1)) << (word >> 3 & 15)) as i32;
     let (low, high) = ((heights & 0xffff) as i32, (heights >> 16) as i32);
@@ -277,24 +297,28 @@ fn priority<const ERRORS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f
     let far_y = most(y0.abs(), y1.abs());
     let far_z = most(z0.abs(), z1.abs());
     let slack = -2e-6 * (far_x + far_y + far_z);
-    let reach = |n: [f32; 3]| most(n[0] * x0, n[0] * x1) + most(n[1] * y0, n[1] * y1) + most(n[2] * z0, n[2] * z1);
+    let reach = |n: [f32; 3]| {
+        // The farther of two products is that of the corner which the factor's sign points to.
+        let corner = |n: f32, low: f32, high: f32| n * if n >= 0.0 { high } else { low };
+        corner(n[0], x0, x1) + corner(n[1], y0, y1) + corner(n[2], z0, z1)
+    };
     let side = |i: usize| reach(lens.sides[i]);
     let inside = least(least(side(0), side(1)), least(side(2), side(3)));
     // A bit more than nothing, since it is the nearest that counts and boxes are not empty.
     let seen = (inside >= slack) & (reach(lens.forward) >= View::NEAR) & there;
     let number = if ERRORS {
-        let f = lens.forward;
-        let depth = least(f[0] * x0, f[0] * x1) + least(f[1] * y0, f[1] * y1) + least(f[2] * z0, f[2] * z1);
-        let depth = most(depth, View::NEAR);
-        let across = (far_x * far_x + far_y * far_y).sqrt();
-        let away = (far_x * far_x + far_y * far_y + far_z * far_z).sqrt();
-        let (dx, dy, dz) = (x1 - x0, y1 - y0, z1 - z0);
-        let size = (dx * dx + dy * dy + dz * dz).sqrt() * 1.0001;
-        let void = deviation == f32::INFINITY;
-        let wrong = if void { size } else { deviation };
-        let distance = if void { away } else { across };
-        let spread = least(distance / (depth * depth), lens.stretch / depth);
-        wrong * (lens.focal * 1.00002) * spread
+        let [fx, fy, fz] = lens.forward;
+        let corner = |n: f32, low: f32, high: f32| n * if n >= 0.0 { low } else { high };
+        let depth = most(corner(fx, x0, x1) + corner(fy, y0, y1) + corner(fz, z0, z1), View::NEAR);
+        let flat = far_x * far_x + far_y * far_y;
+        let (wrong, distance) = if VOIDS && deviation == f32::INFINITY {
+            let (dx, dy, dz) = (x1 - x0, y1 - y0, z1 - z0);
+            ((dx * dx + dy * dy + dz * dz).sqrt() * 1.0001, (flat + far_z * far_z).sqrt())
+        } else {
+            (deviation, flat.sqrt())
+        };
+        let near = 1.0 / depth;
+        wrong * (lens.focal * 1.00002) * least(distance * near * near, lens.stretch * near)
     } else {
         let gap = |a: f32, b: f32| most(most(a, -b), 0.0);
         let (gx, gy, gz) = (gap(x0, x1), gap(y0, y1), gap(z0, z1));

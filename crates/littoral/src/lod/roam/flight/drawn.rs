@@ -57,7 +57,12 @@ impl RoamFlight<'_> {
             Base::Falling => towards[0] < diamond.at[0],
             Base::East => towards[1] < diamond.at[1],
         };
-        let triangle = if turned { [b, a, apex] } else { [a, b, apex] };
+        self.put(record, side, if turned { [b, a, apex] } else { [a, b, apex] });
+    }
+
+    /// Adds a triangle of a diamond.
+    #[inline]
+    pub(super) fn put(&mut self, record: u32, side: usize, triangle: [u32; 3]) {
         let owner = 2 * record + side as u32;
         let slot = match self.freed.pop() {
             Some(slot) => {

@@ -58,12 +58,25 @@ impl RoamFlight<'_> {
         }
     }
 
-    /// What the split of a diamond that was just made ready asks for.
+    /// Unused memory that the splits after the next will take.
     #[inline]
-    pub(super) fn foresee_child(&self, record: u32, diamond: Diamond) {
-        let known = &self.records[record as usize];
-        known.parents.iter().for_each(|&parent| self.expect_record(parent));
-        self.bounds.expect(diamond);
+    pub(super) fn foresee_room(&self) {
+        for depth in 4..9 {
+            if let Some(&record) = self.unused.iter().nth_back(depth) {
+                self.expect_record(record);
+            }
+        }
+        if let Some(vertex) = self.unused_vertices.iter().nth_back(2).and_then(|&at| self.mesh.vertices.get(at as usize)) {
+            prefetch(vertex);
+        }
+        self.list.expect_room();
+    }
+
+    /// What the split of a diamond that was just made ready asks for; both of its parents are at hand.
+    #[inline]
+    pub(super) fn foresee_child(&self, record: u32) {
+        self.foresee_split(record, 1);
+        self.foresee_split(record, 2);
     }
 
     /// One hop of what the merge of a record asks for.

@@ -219,6 +219,7 @@ impl RoamFlight<'_> {
     /// Begins to load what the coming splits will ask for, one hop of the chain at a time.
     #[inline]
     fn foresee_splits(&self) {
+        self.foresee_room();
         for hop in 0..4 {
             if let Some(key) = self.splits.coming(AHEAD[hop]) {
                 self.foresee_split(key.record(), hop);
