@@ -9,7 +9,7 @@ use clock::{median, processor_time};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::Fbm;
 use littoral::field::{Land, Raster};
-use littoral::lod::{Limits, NestedBounds, RoamFlight};
+use littoral::lod::{Limits, Mesh, NestedBounds, RoamFlight, RoamOnce};
 use littoral::space::View;
 use std::hint::black_box;
 
@@ -29,6 +29,7 @@ fn main() {
         bounds.bytes() as f64 / land.raster().heights().len() as f64
     );
     if std::env::var("DEV").is_ok() {
+        if std::env::var("SCR").is_ok() { scratch(&bounds, &land); return; }
         if let Ok(case) = std::env::var("CASE") {
             let v: Vec<f64> = case.split(',').map(|x| x.parse().unwrap()).collect();
             flight(&bounds, &land, v[0] as usize, &case, (v[1], v[2]), v[3] as usize, f64::INFINITY);
@@ -131,6 +132,16 @@ fn flight(
 /// A mesh from nothing.
 fn scratch(bounds: &NestedBounds, land: &Land) {
     for triangles in [100_000, 1_000_000] {
+        let mut once = RoamOnce::over(bounds, Limits { finest: 12, triangles });
+        let mut mesh = Mesh::default();
+        let seconds = median(7, || {
+            once.draw(&view(land, 0.0, 0.0, 0.0), &mut mesh).expect("a view");
+        });
+        println!(
+            "{triangles} triangles from scratch, nothing kept: {:.2} ms, {:.1} M bisections/s",
+            seconds * 1e3,
+            mesh.triangles.len() as f64 / seconds * 1e-6
+        );
         let mut flight = RoamFlight::over(bounds, Limits { finest: 12, triangles });
         let view = view(land, 0.0, 0.0, 0.0);
         flight.update(&view, &mut || false).expect("a view");

@@ -22,10 +22,12 @@ mod bounds;
 mod diamond;
 mod flight;
 mod scan;
+mod scratch;
 
 pub use bounds::{NestedBounds, TooManySamples};
 pub use flight::RoamFlight;
 pub use scan::Priority;
+pub use scratch::RoamOnce;
 
 use super::{Drawing, Limits, Lod, Reached, ScreenMetric, Vertex, ViewError};
 use crate::field::HeightField;

@@ -7,7 +7,9 @@
 //! Deviations are measured at every sample of every triangle. Over the patches that a triangle holds whole the bilinear surface is farthest from
 //! it at a sample; those that its diagonal base cuts bulge by a quarter of their twist, which is added. Legs are bases of smaller triangles.
 
-use super::diamond::{Base, Diamond, Point};
+use super::diamond::{Base, Diamond, Point, STEPS};
+use super::scan::{Item, Lens, Priority};
+use crate::lod::ScreenMetric;
 use crate::field::{HeightField, Land};
 use crate::space::{Cell, Datum};
 use rayon::prelude::*;
@@ -202,6 +204,82 @@ impl NestedBounds {
             Base::East => &of.east[j * n + i],
             Base::North => &of.north[j * (n + 1) + i],
         }
+    }
+
+    /// Bits of lattice coordinates below a step: half a sample.
+    #[inline]
+    pub(super) fn shift(&self) -> u8 {
+        Cell::MAX_LEVEL - self.finest - 1
+    }
+
+    /// The lattice point of one in steps, x in the lower half.
+    #[inline]
+    pub(super) fn point(&self, at: u32) -> Point {
+        [(at & 0xffff) << self.shift(), (at >> 16) << self.shift()]
+    }
+
+    /// How many triangles the split of a diamond adds; its middle in steps.
+    #[inline]
+    pub(super) fn cost(&self, at: u32) -> usize {
+        let (x, y, end) = (at & 0xffff, at >> 16, 2 << self.finest);
+        if x == 0 || y == 0 || x == end || y == end { 1 } else { 2 }
+    }
+
+    /// What the priority of a diamond is computed from.
+    #[inline]
+    pub(super) fn item_of(&self, bound: Bound, diamond: Diamond, kind: u8, record: u32) -> Item {
+        let shift = self.shift();
+        Item {
+            at: diamond.at[0] >> shift | diamond.at[1] >> shift << 16,
+            heights: u32::from(bound.low) | u32::from(bound.high) << 16,
+            deviation: bound.deviation(),
+            word: Item::word(kind, diamond.is_square(), diamond.half >> shift, record),
+        }
+    }
+
+    /// The same, its bound looked up.
+    #[inline]
+    pub(super) fn item(&self, diamond: Diamond, kind: u8, record: u32) -> Item {
+        self.item_of(self.bound(diamond), diamond, kind, record)
+    }
+
+    /// The children that a diamond, its middle in steps, is the first parent of.
+    #[inline]
+    pub(super) fn first_children(&self, at: u32, mut each: impl FnMut(Diamond)) {
+        let diamond = Diamond::at(self.point(at));
+        let ([x, y], h) = (diamond.at, diamond.half);
+        if diamond.is_square() {
+            let mut side = |at: Point, base: Base| each(Diamond { at, half: h, base });
+            side([x, y - h], Base::East);
+            side([x + h, y], Base::North);
+            if y + h == STEPS {
+                side([x, y + h], Base::East);
+            }
+            if x == h {
+                side([x - h, y], Base::North);
+            }
+        } else if x > 0 {
+            let q = h / 2;
+            if y > 0 {
+                each(Diamond { at: [x - q, y - q], half: q, base: Base::Falling });
+            }
+            if y < STEPS {
+                each(Diamond { at: [x - q, y + q], half: q, base: Base::Rising });
+            }
+        }
+    }
+
+    /// Whether there is surface under all of a triangle: the middle of its base and its apex, in steps.
+    pub(super) fn whole(&self, middle: Point, apex: Point) -> bool {
+        let [middle, apex] = [middle, apex].map(|at| at.map(|c| c << self.shift()));
+        let diamond = Diamond::at(middle);
+        self.bound(diamond).whole(usize::from(diamond.apexes()[0] != Some(apex)))
+    }
+
+    /// The lens of a view of this land.
+    pub(super) fn lens(&self, metric: &ScreenMetric, priority: Priority) -> Lens {
+        let steps = f64::from(STEPS >> self.shift());
+        Lens::new(metric, self.datum, steps, (self.base, self.step), priority, self.voids)
     }
 
     /// Begins to load what a split of the diamond will ask for.

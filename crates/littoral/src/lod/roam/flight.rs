@@ -16,9 +16,10 @@
 
 use super::bounds::{Bound, NestedBounds};
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
-use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
+use super::scan::{Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
+use super::scratch::Search;
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
-use crate::space::{Cell, Place, View};
+use crate::space::{Place, View};
 use glam::DVec2;
 use std::ops::Range;
 
@@ -87,6 +88,7 @@ pub struct RoamFlight<'a> {
     freed: Vec<u32>,
     changed: Changes,
     found: Vec<u32>,
+    search: Search,
     /// Became splittable in the last step.
     ready: Vec<u32>,
     /// Splits and merges since it was made.
@@ -121,6 +123,7 @@ impl<'a> RoamFlight<'a> {
             freed: Vec::new(),
             changed: Changes::default(),
             found: Vec::new(),
+            search: Search::default(),
             ready: Vec::new(),
             operations: (0, 0),
         }
@@ -190,13 +193,8 @@ impl<'a> RoamFlight<'a> {
     /// If the view is not one that a picture can be drawn of.
     pub fn update(&mut self, view: &View, stop: &mut dyn FnMut() -> bool) -> Result<Reached, ViewError> {
         let metric = ScreenMetric::new(view, self.bounds.datum())?;
-        let steps = f64::from(STEPS >> self.shift());
-        let heights = (self.bounds.base, self.bounds.step);
-        self.lens = Some(Lens::new(&metric, self.bounds.datum(), steps, heights, self.priority, self.bounds.voids()));
-        self.tolerance = match self.priority {
-            Priority::ScreenError => metric.tolerance(),
-            Priority::InverseDistance => 0.0,
-        };
+        self.lens = Some(self.bounds.lens(&metric, self.priority));
+        self.tolerance = self.priority.tolerance(&metric);
         self.changed.clear();
         self.splits.clear();
         self.merges.clear();
@@ -217,11 +215,6 @@ impl<'a> RoamFlight<'a> {
         let void = self.priority == Priority::ScreenError && self.bounds.voids() && self.list.any_void(self.tolerance);
         let pixels = if void { f32::INFINITY } else { worst };
         Ok(Reached { pixels, limited: worst > self.tolerance || stopped })
-    }
-
-    /// Bits of lattice coordinates below half a sample.
-    fn shift(&self) -> u8 {
-        Cell::MAX_LEVEL - self.bounds.finest() - 1
     }
 
     /// The two triangles of the face.
@@ -245,9 +238,14 @@ impl<'a> RoamFlight<'a> {
         Vertex { x: at[0], y: at[1], face: 0, height: self.bounds.height(at) }
     }
 
+    /// The level of cells that are not split any more.
+    fn finest(&self) -> u8 {
+        self.limits.finest.min(self.bounds.finest()).min(FINEST)
+    }
+
     /// The list that an unsplit diamond belongs to when it has both triangles.
     fn idle(&self, diamond: Diamond) -> u8 {
-        if diamond.cell_level() < self.limits.finest.min(self.bounds.finest()).min(FINEST) { SPLIT } else { STUCK }
+        if diamond.cell_level() < self.finest() { SPLIT } else { STUCK }
     }
 
     fn record(&mut self, diamond: Diamond, ends: [u32; 2]) -> u32 {
@@ -272,21 +270,11 @@ impl<'a> RoamFlight<'a> {
         self.records.len() as u32 - 1
     }
 
-    fn item(&self, bound: Bound, diamond: Diamond, kind: u8, record: u32) -> Item {
-        let shift = self.shift();
-        Item {
-            at: diamond.at[0] >> shift | diamond.at[1] >> shift << 16,
-            heights: u32::from(bound.low) | u32::from(bound.high) << 16,
-            deviation: bound.deviation(),
-            word: Item::word(kind, diamond.is_square(), diamond.half >> shift, record),
-        }
-    }
-
     /// Puts a record in the list, and in its queue if it is within the band.
     fn join(&mut self, record: u32, kind: u8) {
         let known = &self.records[record as usize];
         let diamond = Diamond::at(known.at);
-        let item = self.item(known.bound, diamond, kind, record);
+        let item = self.bounds.item_of(known.bound, diamond, kind, record);
         let priority = self.lens.as_ref().map_or(0.0, |lens| lens.priority(&item));
         let place = self.list.add(item, priority);
         let known = &mut self.records[record as usize];

@@ -7,7 +7,7 @@
 
 use super::super::ScreenMetric;
 use super::bounds::prefetch;
-use crate::space::{Datum, View};
+use crate::space::{Cell, Datum, View};
 use glam::DVec3;
 use multiversion::multiversion;
 
@@ -19,6 +19,16 @@ pub enum Priority {
     ScreenError,
     /// What is nearest comes first, whatever its shape (1/m): the sea of 1999. Only the limits end it.
     InverseDistance,
+}
+
+impl Priority {
+    /// What priority refinement ends at.
+    pub(super) fn tolerance(self, metric: &ScreenMetric) -> f32 {
+        match self {
+            Priority::ScreenError => metric.tolerance(),
+            Priority::InverseDistance => 0.0,
+        }
+    }
 }
 
 /// A view, in the coordinates of the lists.
@@ -103,6 +113,13 @@ pub(super) struct Item {
 }
 
 impl Item {
+    /// Level of the cell whose diagonal or side the base is; steps are half a sample.
+    #[inline]
+    pub(super) fn unit_level(&self, shift: u8) -> u8 {
+        Cell::MAX_LEVEL - 1 - shift - (self.word >> 3 & 15) as u8
+    }
+
+    #[inline]
     pub(super) fn word(kind: u8, square: bool, unit: u32, record: u32) -> u32 {
         u32::from(kind) | u32::from(square) << 2 | unit.trailing_zeros() << 3 | record << 7
     }
@@ -210,12 +227,7 @@ impl List {
 
     /// Measures all whose number lies in `part`.
     pub(super) fn measure(&mut self, lens: &Lens, part: std::ops::Range<usize>) {
-        let (items, out) = (&self.items[part.clone()], &mut self.numbers[part]);
-        match lens.priority {
-            Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
-            Priority::ScreenError => measure_errors(lens, items, out),
-            Priority::InverseDistance => measure_distances(lens, items, out),
-        }
+        measure(lens, &self.items[part.clone()], &mut self.numbers[part]);
     }
 
     /// Greatest priority of what is not split.
@@ -239,25 +251,34 @@ impl List {
     }
 }
 
+/// Measures many; the number of one that may be merged has its sign bit set.
+pub(super) fn measure(lens: &Lens, items: &[Item], out: &mut [f32]) {
+    match lens.priority {
+        Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
+        Priority::ScreenError => measure_errors(lens, items, out),
+        Priority::InverseDistance => measure_distances(lens, items, out),
+    }
+}
+
 const LANES: usize = 16;
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn measure_errors(lens: &Lens, items: &[Item], out: &mut [f32]) {
-    measure::<true, false>(lens, items, out);
+    measure_one_by_one::<true, false>(lens, items, out);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn measure_errors_and_voids(lens: &Lens, items: &[Item], out: &mut [f32]) {
-    measure::<true, true>(lens, items, out);
+    measure_one_by_one::<true, true>(lens, items, out);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn measure_distances(lens: &Lens, items: &[Item], out: &mut [f32]) {
-    measure::<false, false>(lens, items, out);
+    measure_one_by_one::<false, false>(lens, items, out);
 }
 
 #[inline(always)]
-fn measure<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
+fn measure_one_by_one<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
     let lens = *lens;
     for (out, &Item { at, heights, deviation, word }) in out.iter_mut().zip(items) {
         *out = marked(priority::<ERRORS, VOIDS>(&lens, at, heights, deviation, word), word);

@@ -1,6 +1,7 @@
 //! The two queues: what is split and what is merged next, and when they agree.
 
 use super::*;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 /// How far beyond the last frame's border priorities enter the queues at first.
@@ -79,33 +80,23 @@ impl Queue {
 }
 
 impl RoamFlight<'_> {
-    /// From scratch: splits by thresholds that fall towards where the budget ends, without a queue.
+    /// From scratch: what is to be split is searched for without a record of anything, then split without a queue.
     pub(super) fn descend(&mut self) {
-        let budget = self.limits.triangles;
-        let mut above = f32::INFINITY;
-        loop {
-            self.ready.clear();
-            self.list.within(SPLIT, 0.0, f32::INFINITY, &mut self.found);
-            let worst = self.found.iter().map(|&place| self.list.priority(place)).fold(0.0, f32::max);
-            if worst <= self.tolerance || self.triangles >= budget {
-                break;
-            }
-            // Triangles are about as many as the inverse of the bound; rather too few steps than one too far.
-            let share = self.triangles as f32 / budget as f32;
-            above = (above.min(worst) * (1.1 * share).clamp(0.3, 0.97)).max(self.tolerance);
-            self.list.within(SPLIT, above, f32::INFINITY, &mut self.found);
-            self.ready.extend(self.found.iter().map(|&place| self.list.record(place)));
-            while let Some(record) = self.ready.pop() {
-                let known = &self.records[record as usize];
-                if known.list == SPLIT && self.list.priority(known.place) > above {
-                    self.split(record);
-                }
-                if self.triangles >= budget {
-                    break;
-                }
+        let Some(lens) = self.lens else { return };
+        let budget = self.limits.triangles.max(2);
+        let (bits, level, name) = self.search.run(self.bounds, &lens, self.finest(), self.tolerance, budget).last;
+        self.border = f32::from_bits(bits);
+        self.ready.clear();
+        // Nothing is ready twice, and what becomes ready is pushed: the last first, while its memory is near.
+        self.ready.push(0);
+        while let Some(record) = self.ready.pop() {
+            let known = &self.records[record as usize];
+            let diamond = Diamond::at(known.at);
+            let order = (self.list.priority(known.place).to_bits(), Reverse(diamond.level()), diamond.name());
+            if known.list == SPLIT && order >= (bits, level, name) {
+                self.split(record);
             }
         }
-        self.border = above;
     }
 
     /// Whether a key is still true.
@@ -117,7 +108,7 @@ impl RoamFlight<'_> {
     /// Makes the band wider and takes what it holds into the queues.
     fn widen(&mut self, low: f32, high: f32) {
         let (low, high) = (low.min(self.band.0), high.max(self.band.1));
-        let (list, shift) = (&self.list, self.shift());
+        let (list, shift) = (&self.list, self.bounds.shift());
         let key = |&place: &u32| {
             let at = list.middle(place).map(|c| c << shift);
             Key::new(list.priority(place), Diamond::at(at), list.record(place))

@@ -1,6 +1,7 @@
 //! Against Algorithm I, from scratch and without any queue.
 
 use super::*;
+use crate::lod::RoamOnce;
 use crate::field::{Land, Raster};
 use glam::{DVec2, DVec3, UVec2};
 use proptest::prelude::*;
@@ -9,7 +10,7 @@ use std::collections::BTreeSet;
 /// Splits, one at a time, the triangle of greatest priority among all that are there; returns the triangles, and the greatest priority left.
 fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
     let lens = flight.lens.as_ref().expect("a view was seen");
-    let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
+    let number = |diamond: Diamond| lens.priority(&flight.bounds.item(diamond, SPLIT, 0));
     let mut split: BTreeSet<u64> = BTreeSet::new();
     let mut leaves: Vec<(Diamond, usize)> = vec![(Diamond::ROOT, 0), (Diamond::ROOT, 1)];
     loop {
@@ -55,7 +56,7 @@ fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
 /// Whether no diamond has a greater priority than those that must be split before it.
 fn nested(flight: &RoamFlight) -> bool {
     let lens = flight.lens.as_ref().expect("a view was seen");
-    let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
+    let number = |diamond: Diamond| lens.priority(&flight.bounds.item(diamond, SPLIT, 0));
     let finest = flight.bounds.finest();
     let mut level = vec![Diamond::ROOT];
     while !level.is_empty() {
@@ -83,8 +84,12 @@ fn turned(triangle: [Point; 3]) -> [Point; 3] {
 }
 
 fn drawn(flight: &RoamFlight) -> BTreeSet<[Point; 3]> {
-    let corner = |i: u32| flight.mesh.vertices[i as usize];
-    flight.mesh.triangles.iter().map(|t| turned(t.map(|i| [corner(i).x, corner(i).y]))).collect()
+    drawn_of(&flight.mesh)
+}
+
+fn drawn_of(mesh: &Mesh) -> BTreeSet<[Point; 3]> {
+    let corner = |i: u32| mesh.vertices[i as usize];
+    mesh.triangles.iter().map(|t| turned(t.map(|i| [corner(i).x, corner(i).y]))).collect()
 }
 
 fn split_set(flight: &RoamFlight) -> BTreeSet<Point> {
@@ -155,6 +160,12 @@ proptest! {
                 }
             }
             prop_assert_eq!(drawn(&flight), triangles);
+            let mut once = RoamOnce::over(&bounds, flight.limits);
+            once.priority = flight.priority;
+            let mut mesh = Mesh::default();
+            prop_assert_eq!(once.draw(&view, &mut mesh).expect("a view"), reached);
+            prop_assert_eq!(mesh.triangles.len(), flight.mesh.triangles.len());
+            prop_assert_eq!(drawn_of(&mesh), drawn(&flight));
             if reached.pixels.is_finite() {
                 prop_assert_eq!(reached.pixels, worst);
             }
