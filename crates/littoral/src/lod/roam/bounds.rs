@@ -8,6 +8,7 @@
 //! it at a sample; those that its diagonal base cuts bulge by a quarter of their twist, which is added. Legs are bases of smaller triangles.
 
 use super::diamond::{Base, Diamond, Point, STEPS};
+use super::factors::{Factors, Slopes};
 use super::scan::{Item, Lens, Priority};
 use crate::lod::ScreenMetric;
 use crate::field::{HeightField, Land};
@@ -65,7 +66,7 @@ pub(super) enum Cover {
     Void,
 }
 
-/// Nested bounds of every diamond over land: eight bytes a sample.
+/// Nested bounds of every diamond over land: eight bytes a sample, and the heights' own four.
 #[derive(Clone, Debug)]
 pub struct NestedBounds {
     datum: Datum,
@@ -79,16 +80,60 @@ pub struct NestedBounds {
     heights: Vec<f32>,
     voids: bool,
     levels: Vec<Level>,
+    /// As `levels`, if asked for.
+    slopes: Vec<Level<Slopes>>,
 }
 
 /// The diamonds of the cells of one level and of their sides.
-#[derive(Clone, Debug, Default)]
-struct Level {
-    squares: Vec<Bound>,
+#[derive(Clone, Debug)]
+struct Level<T = Bound> {
+    squares: Vec<T>,
     /// Sides that run east: cells a side × (cells a side + 1).
-    east: Vec<Bound>,
+    east: Vec<T>,
     /// Sides that run north: (cells a side + 1) × cells a side.
-    north: Vec<Bound>,
+    north: Vec<T>,
+}
+
+impl<T> Default for Level<T> {
+    fn default() -> Level<T> {
+        Level { squares: Vec::new(), east: Vec::new(), north: Vec::new() }
+    }
+}
+
+impl<T: Send> Level<T> {
+    /// Something of each side of the level's cells, asked for by its middle in halves of a cell.
+    fn sides(level: u8, of: &(dyn Fn(u32, u32) -> T + Sync)) -> Level<T> {
+        let n = 1u32 << level;
+        Level {
+            squares: Vec::new(),
+            east: rows(n, n + 1, &|i, j| of(2 * i + 1, 2 * j)),
+            north: rows(n + 1, n, &|i, j| of(2 * i, 2 * j + 1)),
+        }
+    }
+
+    /// The same of each cell.
+    fn squares(level: u8, of: &(dyn Fn(u32, u32) -> T + Sync)) -> Vec<T> {
+        rows(1 << level, 1 << level, &|i, j| of(2 * i + 1, 2 * j + 1))
+    }
+}
+
+/// Something of each place of a grid, in parallel.
+fn rows<T: Send>(columns: u32, rows: u32, of: &(dyn Fn(u32, u32) -> T + Sync)) -> Vec<T> {
+    (0..rows * columns).into_par_iter().with_min_len(64).map(|i| of(i % columns, i / columns)).collect()
+}
+
+impl<T> Level<T> {
+    /// What is kept of a diamond of cells of this level.
+    #[inline]
+    fn slot(&self, diamond: Diamond, level: u8) -> &T {
+        let n = 1usize << level;
+        let [i, j] = [0, 1].map(|i| (diamond.at[i] >> (Cell::MAX_LEVEL - level)) as usize);
+        match diamond.base {
+            Base::Rising | Base::Falling => &self.squares[j * n + i],
+            Base::East => &self.east[j * n + i],
+            Base::North => &self.north[j * (n + 1) + i],
+        }
+    }
 }
 
 /// The land has more samples than a flight can name.
@@ -135,34 +180,25 @@ impl NestedBounds {
         let base = low - 2.0 * step;
         let voids = heights.iter().any(|height| height.is_nan());
         let levels = vec![Level::default(); usize::from(finest) + 1];
-        let mut bounds = NestedBounds { datum: land.datum(), finest, base, step, side, heights, voids, levels };
-        for level in (0..=finest).rev() {
-            if level < finest {
-                let n = 1usize << level;
-                let all = |columns: usize, rows: usize, of: &(dyn Fn(usize, usize) -> Bound + Sync)| {
-                    let mut all = vec![Bound::EMPTY; columns * rows];
-                    all.par_chunks_mut(columns).enumerate().for_each(|(row, line)| {
-                        line.iter_mut().enumerate().for_each(|(column, bound)| *bound = of(column, row));
-                    });
-                    all
-                };
-                let half = Diamond::ROOT.half >> level;
-                let at = |i: usize, j: usize| [i as u32 * half, j as u32 * half];
-                let east = all(n, n + 1, &|i, j| bounds.measure(land, Diamond::at(at(2 * i + 1, 2 * j))));
-                let north = all(n + 1, n, &|i, j| bounds.measure(land, Diamond::at(at(2 * i, 2 * j + 1))));
-                bounds.levels[usize::from(level)].east = east;
-                bounds.levels[usize::from(level)].north = north;
-                let squares = all(n, n, &|i, j| bounds.measure(land, Diamond::at(at(2 * i + 1, 2 * j + 1))));
-                bounds.levels[usize::from(level)].squares = squares;
-            }
+        let mut bounds = NestedBounds { datum: land.datum(), finest, base, step, side, heights, voids, levels, slopes: Vec::new() };
+        for level in (0..finest).rev() {
+            let half = Diamond::ROOT.half >> level;
+            let of = |bounds: &NestedBounds, i, j| bounds.measure(land, Diamond::at([i * half, j * half]));
+            let sides = Level::sides(level, &|i, j| of(&bounds, i, j));
+            bounds.levels[usize::from(level)] = sides;
+            let squares = Level::<Bound>::squares(level, &|i, j| of(&bounds, i, j));
+            bounds.levels[usize::from(level)].squares = squares;
         }
         Ok(bounds)
     }
 
     /// Bytes of memory held, heights included.
     pub fn bytes(&self) -> usize {
-        let count = |level: &Level| level.squares.len() + level.east.len() + level.north.len();
-        self.heights.len() * size_of::<f32>() + self.levels.iter().map(count).sum::<usize>() * size_of::<Bound>()
+        fn bytes<T>(levels: &[Level<T>]) -> usize {
+            let count = |level: &Level<T>| level.squares.len() + level.east.len() + level.north.len();
+            levels.iter().map(count).sum::<usize>() * size_of::<T>()
+        }
+        self.heights.len() * size_of::<f32>() + bytes(&self.levels) + bytes(&self.slopes)
     }
 
     /// What the heights are counted from.
@@ -196,14 +232,42 @@ impl NestedBounds {
     #[inline]
     fn slot(&self, diamond: Diamond) -> &Bound {
         let level = diamond.cell_level();
-        let of = &self.levels[usize::from(level)];
-        let n = 1usize << level;
-        let [i, j] = [0, 1].map(|i| (diamond.at[i] >> (Cell::MAX_LEVEL - level)) as usize);
-        match diamond.base {
-            Base::Rising | Base::Falling => &of.squares[j * n + i],
-            Base::East => &of.east[j * n + i],
-            Base::North => &of.north[j * (n + 1) + i],
+        self.levels[usize::from(level)].slot(diamond, level)
+    }
+
+    /// Keeps slopes, too, which some [`Factors`] ask for: four bytes a sample.
+    pub fn with_slopes(mut self) -> NestedBounds {
+        self.slopes = vec![Level::default(); usize::from(self.finest)];
+        for level in (0..self.finest).rev() {
+            let half = Diamond::ROOT.half >> level;
+            let of = |bounds: &NestedBounds, i, j| {
+                let children = Diamond::at([i * half, j * half]).children().into_iter().flatten();
+                children.fold(Slopes::EMPTY, |all, child| all.union(bounds.slopes(child)))
+            };
+            let sides = Level::sides(level, &|i, j| of(&self, i, j));
+            self.slopes[usize::from(level)] = sides;
+            let squares = Level::<Slopes>::squares(level, &|i, j| of(&self, i, j));
+            self.slopes[usize::from(level)].squares = squares;
         }
+        self
+    }
+
+    /// The slopes of all that needs a diamond; none if they were not asked for.
+    #[inline]
+    pub(super) fn slopes(&self, diamond: Diamond) -> Slopes {
+        if self.slopes.is_empty() {
+            return Slopes::EMPTY;
+        }
+        let level = diamond.cell_level();
+        if level < self.finest {
+            return *self.slopes[usize::from(level)].slot(diamond, level);
+        }
+        let Datum::Plane { size, .. } = self.datum else { return Slopes::EMPTY };
+        let [x, y] = diamond.at.map(|c| (c >> (Cell::MAX_LEVEL - self.finest)) as usize);
+        let corners = if level == self.finest && diamond.is_square() { self.corners(x, y) } else { None };
+        let Some([a, b, c, d]) = corners else { return Slopes::EMPTY };
+        let [dx, dy] = (size / f64::from(1u32 << self.finest)).as_vec2().to_array();
+        Slopes::of([(b - a) / dx, (d - c) / dx], [(c - a) / dy, (d - b) / dy])
     }
 
     /// Bits of lattice coordinates below a step: half a sample.
@@ -277,9 +341,22 @@ impl NestedBounds {
     }
 
     /// The lens of a view of this land.
-    pub(super) fn lens(&self, metric: &ScreenMetric, priority: Priority) -> Lens {
+    pub(super) fn lens(&self, metric: &ScreenMetric, priority: Priority, factors: &Factors) -> Lens {
         let steps = f64::from(STEPS >> self.shift());
-        Lens::new(metric, self.datum, steps, (self.base, self.step), priority, self.voids)
+        Lens::new(metric, self.datum, steps, (self.base, self.step), priority, self.voids, factors)
+    }
+
+    /// Begins to load the bounds of those that a diamond is the first parent of.
+    #[inline]
+    pub(super) fn expect_first(&self, at: u32) {
+        self.first_children(at, |child| {
+            if child.cell_level() < self.finest {
+                prefetch(self.slot(child));
+            } else {
+                let [x, y] = self.sample(child.at);
+                prefetch(&self.heights[y * self.side + x]);
+            }
+        });
     }
 
     /// Begins to load what a split of the diamond will ask for.

@@ -14,7 +14,9 @@
 //! Works this rests on: M. Duchaineau et al., "ROAMing terrain: real-time optimally adapting meshes", 1997; P. Lindstrom and V. Pascucci,
 //! "Terrain simplification simplified", 2002 (nesting).
 
+use super::CORNERS;
 use super::bounds::{Bound, NestedBounds};
+use super::factors::Factors;
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
 use super::scan::{Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use super::scratch::Search;
@@ -66,6 +68,8 @@ pub struct RoamFlight<'a> {
     pub limits: Limits,
     /// What comes first.
     pub priority: Priority,
+    /// What makes triangles matter more or less.
+    pub factors: Factors,
     /// Priorities are measured anew for one in so many groups a frame, round robin (1: all). With more, what is reached is told from priorities up to so many
     /// frames old.
     pub groups: u32,
@@ -95,9 +99,6 @@ pub struct RoamFlight<'a> {
     operations: (u64, u64),
 }
 
-/// Corners of the face, the first four vertices: south-west, south-east, north-east, north-west.
-const CORNERS: [Point; 4] = [[0, 0], [STEPS, 0], [STEPS, STEPS], [0, STEPS]];
-
 impl<'a> RoamFlight<'a> {
     /// A flight over prepared land, with nothing drawn yet.
     pub fn over(bounds: &'a NestedBounds, limits: Limits) -> RoamFlight<'a> {
@@ -105,6 +106,7 @@ impl<'a> RoamFlight<'a> {
             bounds,
             limits,
             priority: Priority::default(),
+            factors: Factors::default(),
             groups: 1,
             turn: 0,
             records: Vec::new(),
@@ -193,7 +195,7 @@ impl<'a> RoamFlight<'a> {
     /// If the view is not one that a picture can be drawn of.
     pub fn update(&mut self, view: &View, stop: &mut dyn FnMut() -> bool) -> Result<Reached, ViewError> {
         let metric = ScreenMetric::new(view, self.bounds.datum())?;
-        self.lens = Some(self.bounds.lens(&metric, self.priority));
+        self.lens = Some(self.bounds.lens(&metric, self.priority, &self.factors));
         self.tolerance = self.priority.tolerance(&metric);
         self.changed.clear();
         self.splits.clear();
@@ -275,8 +277,9 @@ impl<'a> RoamFlight<'a> {
         let known = &self.records[record as usize];
         let diamond = Diamond::at(known.at);
         let item = self.bounds.item_of(known.bound, diamond, kind, record);
-        let priority = self.lens.as_ref().map_or(0.0, |lens| lens.priority(&item));
-        let place = self.list.add(item, priority);
+        let slopes = self.bounds.slopes(diamond);
+        let priority = self.lens.as_ref().map_or(0.0, |lens| lens.priority(&item, slopes));
+        let place = self.list.add(item, slopes, priority);
         let known = &mut self.records[record as usize];
         (known.place, known.list) = (place, kind);
         self.enqueue(record, diamond, kind, priority);

@@ -7,6 +7,7 @@
 
 use super::super::ScreenMetric;
 use super::bounds::prefetch;
+use super::factors::{Factors, Slopes, Weights};
 use crate::space::{Cell, Datum, View};
 use glam::DVec3;
 use multiversion::multiversion;
@@ -32,7 +33,7 @@ impl Priority {
 }
 
 /// A view, in the coordinates of the lists.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Lens {
     /// The eye's place, in whole steps, and what is left of it (m).
     eye: [i32; 2],
@@ -50,6 +51,7 @@ pub(super) struct Lens {
     priority: Priority,
     /// Whether anything may be void.
     voids: bool,
+    weights: Option<Weights>,
 }
 
 impl Lens {
@@ -61,6 +63,7 @@ impl Lens {
         heights: (f32, f32),
         priority: Priority,
         voids: bool,
+        factors: &Factors,
     ) -> Lens {
         let (forward, sides, focal, stretch) = metric.lens();
         let (origin, size) = match datum {
@@ -84,15 +87,25 @@ impl Lens {
             stretch,
             priority,
             voids,
+            weights: Weights::new(factors, eye.truncate()),
         }
     }
 
+    /// The box round all that needs a diamond.
+    pub(super) fn extent(&self, item: &Item) -> Extent {
+        extent(self, item.at, item.heights, item.word)
+    }
+
     /// The priority of one.
-    pub(super) fn priority(&self, item: &Item) -> f32 {
+    pub(super) fn priority(&self, item: &Item, slopes: Slopes) -> f32 {
         let Item { at, heights, deviation, word } = *item;
-        match self.priority {
+        let number = match self.priority {
             Priority::ScreenError => priority::<true, true>(self, at, heights, deviation, word),
             Priority::InverseDistance => priority::<false, true>(self, at, heights, deviation, word),
+        };
+        match &self.weights {
+            Some(weights) if number > 0.0 => number * weights.of(&self.extent(item), slopes),
+            _ => number,
         }
     }
 }
@@ -136,6 +149,7 @@ pub(super) const NOWHERE: u8 = 3;
 #[derive(Clone, Debug, Default)]
 pub(super) struct List {
     items: Vec<Item>,
+    slopes: Vec<Slopes>,
     /// Priorities, as last measured, with the sign bit set for what may be merged; NaN where there is no entry.
     numbers: Vec<f32>,
     left: Vec<u32>,
@@ -148,19 +162,22 @@ impl List {
 
     pub(super) fn clear(&mut self) {
         self.items.clear();
+        self.slopes.clear();
         self.left.clear();
         self.numbers.clear();
     }
 
     /// Adds one; returns where.
-    pub(super) fn add(&mut self, item: Item, priority: f32) -> u32 {
+    pub(super) fn add(&mut self, item: Item, slopes: Slopes, priority: f32) -> u32 {
         let number = marked(priority, item.word);
         let Some(place) = self.left.pop() else {
             self.items.push(item);
+            self.slopes.push(slopes);
             self.numbers.push(number);
             return self.items.len() as u32 - 1;
         };
         self.items[place as usize] = item;
+        self.slopes[place as usize] = slopes;
         self.numbers[place as usize] = number;
         place
     }
@@ -227,7 +244,7 @@ impl List {
 
     /// Measures all whose number lies in `part`.
     pub(super) fn measure(&mut self, lens: &Lens, part: std::ops::Range<usize>) {
-        measure(lens, &self.items[part.clone()], &mut self.numbers[part]);
+        measure(lens, &self.items[part.clone()], &self.slopes[part.clone()], &mut self.numbers[part]);
     }
 
     /// Greatest priority of what is not split.
@@ -252,11 +269,14 @@ impl List {
 }
 
 /// Measures many; the number of one that may be merged has its sign bit set.
-pub(super) fn measure(lens: &Lens, items: &[Item], out: &mut [f32]) {
+pub(super) fn measure(lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {
     match lens.priority {
         Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
         Priority::ScreenError => measure_errors(lens, items, out),
         Priority::InverseDistance => measure_distances(lens, items, out),
+    }
+    if let Some(weights) = &lens.weights {
+        weights.weigh(lens, items, slopes, out);
     }
 }
 
@@ -279,9 +299,8 @@ fn measure_distances(lens: &Lens, items: &[Item], out: &mut [f32]) {
 
 #[inline(always)]
 fn measure_one_by_one<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
-    let lens = *lens;
     for (out, &Item { at, heights, deviation, word }) in out.iter_mut().zip(items) {
-        *out = marked(priority::<ERRORS, VOIDS>(&lens, at, heights, deviation, word), word);
+        *out = marked(priority::<ERRORS, VOIDS>(lens, at, heights, deviation, word), word);
     }
 }
 
@@ -301,19 +320,29 @@ fn most(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The priority of an [`Item`].
+/// A box, from the eye (m): least and greatest eastward, northward and upward.
+pub(super) struct Extent(pub [[f32; 2]; 3]);
+
+/// The box round all that needs a diamond.
 #[inline(always)]
-fn priority<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f32, word: u32) -> f32 {
+fn extent(lens: &Lens, at: u32, heights: u32, word: u32) -> Extent {
     let (x, y) = ((at & 0xffff) as i32, (at >> 16) as i32);
     let half = ((2 + (word >> 2 & 1)) << (word >> 3 & 15)) as i32;
     let (low, high) = ((heights & 0xffff) as i32, (heights >> 16) as i32);
-    let there = low <= high;
     let (low, high) = (lens.base + low as f32 * lens.step, lens.base + high as f32 * lens.step);
-    let x0 = (x - half - lens.eye[0]) as f32 * lens.scale[0] - lens.rest[0];
-    let x1 = (x + half - lens.eye[0]) as f32 * lens.scale[0] - lens.rest[0];
-    let y0 = (y - half - lens.eye[1]) as f32 * lens.scale[1] - lens.rest[1];
-    let y1 = (y + half - lens.eye[1]) as f32 * lens.scale[1] - lens.rest[1];
-    let (z0, z1) = (low - lens.height, high - lens.height);
+    let along = |x: i32, axis: usize| (x - lens.eye[axis]) as f32 * lens.scale[axis] - lens.rest[axis];
+    Extent([
+        [along(x - half, 0), along(x + half, 0)],
+        [along(y - half, 1), along(y + half, 1)],
+        [low - lens.height, high - lens.height],
+    ])
+}
+
+/// The priority of an [`Item`], but for the factors.
+#[inline(always)]
+fn priority<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f32, word: u32) -> f32 {
+    let there = heights & 0xffff <= heights >> 16;
+    let Extent([[x0, x1], [y0, y1], [z0, z1]]) = extent(lens, at, heights, word);
     let far_x = most(x0.abs(), x1.abs());
     let far_y = most(y0.abs(), y1.abs());
     let far_z = most(z0.abs(), z1.abs());

@@ -9,7 +9,9 @@
 //! "Terrain simplification simplified", 2002.
 
 use super::bounds::NestedBounds;
-use super::diamond::{Diamond, Point, STEPS};
+use super::CORNERS;
+use super::diamond::Diamond;
+use super::factors::{Factors, Slopes};
 use super::scan::{Item, Lens, Priority, SPLIT, measure};
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
 use crate::space::View;
@@ -22,6 +24,8 @@ pub struct RoamOnce<'a> {
     pub limits: Limits,
     /// What comes first.
     pub priority: Priority,
+    /// What makes triangles matter more or less.
+    pub factors: Factors,
     search: Search,
     /// For each sample the vertex on it; 0 where there is none.
     vertices: Vec<u32>,
@@ -36,6 +40,7 @@ pub(super) struct Search {
     waiting: Vec<(Item, f32)>,
     wave: Vec<u32>,
     asked: Vec<Item>,
+    slopes: Vec<Slopes>,
     numbers: Vec<f32>,
     bits: Vec<u32>,
     rest: Vec<(Order, u32)>,
@@ -74,7 +79,7 @@ impl Search {
         self.waiting.clear();
         let root = bounds.item(Diamond::ROOT, SPLIT, 0);
         let mut found = Found { worst: 0.0, void: false, last: (u32::MAX, std::cmp::Reverse(0), 0) };
-        let first = lens.priority(&root);
+        let first = lens.priority(&root, bounds.slopes(Diamond::ROOT));
         // What cannot be split, at least not by this search, only counts.
         let mut leave = |item: &Item, number: f32| {
             found.worst = found.worst.max(number);
@@ -103,16 +108,20 @@ impl Search {
             let mut at = 0;
             while at < self.wave.len() {
                 self.asked.clear();
+                self.slopes.clear();
                 let end = (at + TOGETHER).min(self.wave.len());
                 for &at in &self.wave[at..end] {
-                    bounds.expect(Diamond::at(bounds.point(at)));
+                    bounds.expect_first(at);
                 }
                 for &at in &self.wave[at..end] {
-                    bounds.first_children(at, |child| self.asked.push(bounds.item(child, SPLIT, 0)));
+                    bounds.first_children(at, |child| {
+                        self.asked.push(bounds.item(child, SPLIT, 0));
+                        self.slopes.push(bounds.slopes(child));
+                    });
                 }
                 at = end;
                 self.numbers.resize(self.asked.len(), 0.0);
-                measure(lens, &self.asked, &mut self.numbers);
+                measure(lens, &self.asked, &self.slopes, &mut self.numbers);
                 for (item, &number) in self.asked.iter().zip(&self.numbers) {
                     if !splittable(item) || number <= tolerance {
                         leave(item, number);
@@ -180,7 +189,12 @@ impl Search {
 impl<'a> RoamOnce<'a> {
     /// The method over prepared land within limits.
     pub fn over(bounds: &'a NestedBounds, limits: Limits) -> RoamOnce<'a> {
-        RoamOnce { bounds, limits, priority: Priority::default(), search: Search::default(), vertices: Vec::new() }
+        RoamOnce {
+            bounds,
+            limits,
+            priority: Priority::default(),
+            factors: Factors::default(),
+            search: Search::default(), vertices: Vec::new() }
     }
 
     /// Overwrites `mesh` with that of `view`.
@@ -190,14 +204,13 @@ impl<'a> RoamOnce<'a> {
     pub fn draw(&mut self, view: &View, mesh: &mut Mesh) -> Result<Reached, ViewError> {
         let bounds = self.bounds;
         let metric = ScreenMetric::new(view, bounds.datum())?;
-        let lens = bounds.lens(&metric, self.priority);
+        let lens = bounds.lens(&metric, self.priority, &self.factors);
         let tolerance = self.priority.tolerance(&metric);
         let finest = self.limits.finest.min(bounds.finest());
         let found = self.search.run(bounds, &lens, finest, tolerance, self.limits.triangles);
         mesh.clear();
-        let corners = [[0, 0], [STEPS, 0], [STEPS, STEPS], [0, STEPS]];
         let taken = self.search.taken.iter().map(|&(at, _)| bounds.point(at));
-        mesh.vertices.extend(corners.into_iter().chain(taken).map(|at: Point| Vertex {
+        mesh.vertices.extend(CORNERS.into_iter().chain(taken).map(|at| Vertex {
             x: at[0],
             y: at[1],
             face: 0,

@@ -82,9 +82,10 @@ impl Queue {
 impl RoamFlight<'_> {
     /// From scratch: what is to be split is searched for without a record of anything, then split without a queue.
     pub(super) fn descend(&mut self) {
-        let Some(lens) = self.lens else { return };
+        let Some(lens) = &self.lens else { return };
         let budget = self.limits.triangles.max(2);
-        let (bits, level, name) = self.search.run(self.bounds, &lens, self.finest(), self.tolerance, budget).last;
+        let finest = self.finest();
+        let (bits, level, name) = self.search.run(self.bounds, lens, finest, self.tolerance, budget).last;
         self.border = f32::from_bits(bits);
         self.ready.clear();
         // Nothing is ready twice, and what becomes ready is pushed: the last first, while its memory is near.
@@ -155,9 +156,9 @@ impl RoamFlight<'_> {
             }
             let (top, last) = self.next();
             let merging = match (top, last) {
-                // Nothing is split that need not be.
-                (_, Some(last)) if last.number() <= tolerance => true,
                 _ if self.triangles > budget => true,
+                // Nothing is split that need not be; but first comes what is missing, lest a stopped frame only lose triangles.
+                (None, Some(last)) if last.number() <= tolerance => true,
                 (Some(top), _) => {
                     let known = &self.records[top.record() as usize];
                     if self.triangles + cost(known, Diamond::at(known.at)) <= budget {
