@@ -14,7 +14,7 @@ use littoral::field::noise::Fbm;
 use littoral::field::{Land, Raster, Sea, coast};
 use littoral::lod::{Drawing, Limits, Lod, Mesh, NestedBounds, Priority, Roam, RoamFlight, RoamOnce};
 use littoral::space::{Datum, View};
-use littoral::waves::{Depths, Path, Peachey, Superposition, Surf, Swell};
+use littoral::waves::{Depths, Length, Path, Peachey, Sine, Sines, StillWater, Superposition, Surf, Swell};
 use std::hint::black_box;
 
 const EXTENT: f64 = 30_000.0;
@@ -271,23 +271,37 @@ fn sea() {
     }
 }
 
-/// The set-up of 1999: 1500 triangles over 3000 × 2000 m of Peachey's sea, the nearest first; heights, normals and texture coordinates in each frame. The
-/// waves: four swells of 4 to 11 s, straight rays, over a bed that falls from 5 to 45 m.
+/// The set-up of 1999: 1500 triangles over 3000 × 2000 m of sea, the nearest first; heights, normals and texture coordinates in each frame. The sea is
+/// four waves of 4 to 11 s: sines over deep water, or Peachey's along straight rays over a bed that falls from 5 to 45 m.
 fn sea_of_1999() {
     let size = DVec2::new(3000.0, 2000.0);
+    let waves = [(0.8, 11.0, -1.6), (0.4, 7.0, -1.2), (0.2, 5.0, -2.0), (0.1, 4.0, -1.4)];
+    let calm = || Sea::new(Datum::Plane { origin: DVec2::ZERO, size }, 0.0);
+    let sine = |(amplitude, period, heading): (f64, f64, f64)| Sine {
+        amplitude,
+        length: Length::Period(period),
+        heading,
+        phase: heading,
+        steepness: 0.0,
+    };
+    let sines = Sines::new(&waves.map(sine), StillWater::DEEP).expect("waves");
+    frames_of_1999("four sines", calm().with(Box::new(sines)), size);
     let (columns, rows) = (61, 41);
     let depths = (0..columns * rows).map(|i| 5.0 + 40.0 * (i / columns) as f32 / (rows - 1) as f32).collect();
     let bed = Depths { origin: DVec2::ZERO, spacing: 50.0, columns, rows, depths };
-    let swell = |amplitude, period, heading: f64| Swell { amplitude, period, heading, phase: heading };
-    let swells = [swell(0.8, 11.0, -1.6), swell(0.4, 7.0, -1.2), swell(0.2, 5.0, -2.0), swell(0.1, 4.0, -1.4)];
-    let waves = Peachey::new(&bed, &swells, Path::Straight, Surf::default()).expect("waves");
-    let mut sea = Sea::new(Datum::Plane { origin: DVec2::ZERO, size }, 0.0).with(Box::new(waves));
+    let swell = |(amplitude, period, heading): (f64, f64, f64)| Swell { amplitude, period, heading, phase: heading };
+    let peachey = Peachey::new(&bed, &waves.map(swell), Path::Straight, Surf::default()).expect("waves");
+    frames_of_1999("Peachey's four", calm().with(Box::new(peachey)), size);
+}
+
+fn frames_of_1999(name: &str, mut sea: Sea, size: DVec2) {
+    const SIDE: usize = 1025;
     // The mesh knows how high the water may stand, not how high it stands.
     let most = sea.bounds().height;
-    let heights = (0..65 * 65).map(|i| if i % 2 == 0 { most } else { -most }).collect();
-    let still = Land::new(Raster::new(65, 65, size / 64.0, heights).expect("sizes are valid"));
-    let bounds = NestedBounds::of(&still).expect("few samples");
-    let mut flight = RoamFlight::over(&bounds, Limits { finest: 6, triangles: 1500 });
+    let heights = (0..SIDE * SIDE).map(|i| if i % 2 == 0 { most } else { -most }).collect();
+    let raster = Raster::new(SIDE, SIDE, size / (SIDE - 1) as f64, heights).expect("sizes are valid");
+    let bounds = NestedBounds::of(&Land::new(raster)).expect("few samples");
+    let mut flight = RoamFlight::over(&bounds, Limits { finest: 10, triangles: 1500 });
     flight.priority = Priority::InverseDistance;
     let (mut places, mut waters) = (Vec::new(), Vec::new());
     let (mut positions, mut normals, mut coordinates) = (Vec::new(), Vec::new(), Vec::new());
@@ -326,7 +340,7 @@ fn sea_of_1999() {
         times.sort_by(f64::total_cmp);
     }
     println!(
-        "1999: {} triangles, {} vertices over 3 × 2 km of sea: {:.3} / {:.3} ms a frame (median / 99 %), of which {:.3} / {:.3} the choice of triangles",
+        "1999, {name}: {} triangles, {} vertices over 3 × 2 km: {:.3} / {:.3} ms a frame (median / 99 %), of which {:.3} / {:.3} the choice of triangles",
         flight.mesh().triangles.len(),
         flight.mesh().vertices.len(),
         ms[300],

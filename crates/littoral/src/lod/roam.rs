@@ -142,8 +142,9 @@ impl Hasher for Mixed {
     }
 
     fn write_u64(&mut self, name: u64) {
-        let mixed = (self.0 ^ name).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.0 = mixed ^ (mixed >> 29);
+        // Names end in as many zeros as the lattice is finer than the mesh: both halves of the product, so that all bits tell in the lowest.
+        let product = u128::from(self.0 ^ name) * 0x9e37_79b9_7f4a_7c15;
+        self.0 = (product >> 64) as u64 ^ product as u64;
     }
 }
 

@@ -37,6 +37,9 @@ impl Key {
     }
 }
 
+/// How many are sorted at once.
+const SOON: usize = 2048;
+
 /// Greatest first. Most of what a frame changes is known when it begins, lies sorted, and can be seen coming; the rest is in a heap.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Queue {
@@ -58,6 +61,11 @@ impl Queue {
     /// Adds many.
     fn extend(&mut self, keys: impl Iterator<Item = Key>) {
         self.sorted.extend(keys);
+        if let Some(far) = self.sorted.len().checked_sub(SOON) {
+            // A frame that lags behind may not live to see the rest.
+            self.sorted.select_nth_unstable(far);
+            self.later.extend(self.sorted.drain(..far));
+        }
         self.sorted.sort_unstable();
     }
 
