@@ -178,7 +178,9 @@ impl Scene<'_> {
     /// Frames that are stopped by the clock, beside those that are not.
     fn clock(&self) {
         const BUDGET: f64 = 0.2e-3;
-        println!("100000 triangles, stopped after 0.2 ms: ms a frame, median / 99 %; greatest priority over that of unstopped frames, median / 99 %");
+        println!(
+            "100000 triangles, stopped after 0.2 ms: ms a frame, median / 99 %; greatest priority over that of unstopped frames, median / 99 %"
+        );
         for (name, speed, yaw) in [
             ("100 m/s", 100.0, 0.0),
             ("300 m/s", 300.0, 0.0),

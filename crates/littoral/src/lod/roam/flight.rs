@@ -9,15 +9,16 @@
 //! The mesh is kept, not made: a split turns two triangles into four and a merge four into two, in their places in one dense array, and
 //! what changed is told in ranges, so that a GPU need not be sent the rest.
 //!
-//! Records link to parents and children only, a cache line each: the neighbours of a cell are children of its parents, so that what has to be found is one step away.
+//! Records link to parents and children only, a cache line each: the neighbours of a cell are children of its parents, so that what has to be found is one step
+//! away. Where time went was waiting for memory; so what a frame will change is loaded before its turn (`foresight`).
 //!
 //! Works this rests on: M. Duchaineau et al., "ROAMing terrain: real-time optimally adapting meshes", 1997; P. Lindstrom and V. Pascucci,
 //! "Terrain simplification simplified", 2002 (nesting).
 
 use super::CORNERS;
 use super::bounds::{Bound, NestedBounds};
-use super::factors::Factors;
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
+use super::factors::Factors;
 use super::scan::{Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use super::scratch::Search;
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};

@@ -340,7 +340,13 @@ fn extent(lens: &Lens, at: u32, heights: u32, word: u32) -> Extent {
 
 /// The priority of an [`Item`], but for the factors.
 #[inline(always)]
-fn priority<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f32, word: u32) -> f32 {
+fn priority<const ERRORS: bool, const VOIDS: bool>(
+    lens: &Lens,
+    at: u32,
+    heights: u32,
+    deviation: f32,
+    word: u32,
+) -> f32 {
     let there = heights & 0xffff <= heights >> 16;
     let Extent([[x0, x1], [y0, y1], [z0, z1]]) = extent(lens, at, heights, word);
     let far_x = most(x0.abs(), x1.abs());

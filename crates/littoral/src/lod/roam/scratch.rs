@@ -8,8 +8,8 @@
 //! Works this rests on: M. Duchaineau et al., "ROAMing terrain: real-time optimally adapting meshes", 1997; P. Lindstrom and V. Pascucci,
 //! "Terrain simplification simplified", 2002.
 
-use super::bounds::NestedBounds;
 use super::CORNERS;
+use super::bounds::NestedBounds;
 use super::diamond::Diamond;
 use super::factors::{Factors, Slopes};
 use super::scan::{Item, Lens, Priority, SPLIT, measure};
@@ -105,6 +105,10 @@ impl Search {
                 }
                 number <= threshold
             });
+            if self.wave.is_empty() {
+                // Numbers too small to fall by a share.
+                threshold = tolerance;
+            }
             let mut at = 0;
             while at < self.wave.len() {
                 self.asked.clear();
@@ -194,7 +198,9 @@ impl<'a> RoamOnce<'a> {
             limits,
             priority: Priority::default(),
             factors: Factors::default(),
-            search: Search::default(), vertices: Vec::new() }
+            search: Search::default(),
+            vertices: Vec::new(),
+        }
     }
 
     /// Overwrites `mesh` with that of `view`.

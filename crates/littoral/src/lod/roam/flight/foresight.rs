@@ -66,7 +66,9 @@ impl RoamFlight<'_> {
                 self.expect_record(record);
             }
         }
-        if let Some(vertex) = self.unused_vertices.iter().nth_back(2).and_then(|&at| self.mesh.vertices.get(at as usize)) {
+        if let Some(vertex) =
+            self.unused_vertices.iter().nth_back(2).and_then(|&at| self.mesh.vertices.get(at as usize))
+        {
             prefetch(vertex);
         }
         self.list.expect_room();

@@ -38,19 +38,23 @@ impl Key {
 }
 
 /// How many are sorted at once.
-const SOON: usize = 2048;
+const SOON: usize = 256;
 
-/// Greatest first. Most of what a frame changes is known when it begins, lies sorted, and can be seen coming; the rest is in a heap.
+/// Greatest first. Most of what a frame changes is known when it begins: it is sorted a few at a time, since a stopped frame may not live to see the
+/// rest, and what is sorted can be seen coming. What becomes known later is in a heap.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Queue {
-    /// In rising order.
+    /// In rising order; empty only if `rest` is.
     sorted: Vec<Key>,
+    /// None of it is greater than any that is sorted.
+    rest: Vec<Key>,
     later: BinaryHeap<Key>,
 }
 
 impl Queue {
     pub fn clear(&mut self) {
         self.sorted.clear();
+        self.rest.clear();
         self.later.clear();
     }
 
@@ -60,12 +64,17 @@ impl Queue {
 
     /// Adds many.
     fn extend(&mut self, keys: impl Iterator<Item = Key>) {
-        self.sorted.extend(keys);
-        if let Some(far) = self.sorted.len().checked_sub(SOON) {
-            // A frame that lags behind may not live to see the rest.
-            self.sorted.select_nth_unstable(far);
-            self.later.extend(self.sorted.drain(..far));
+        self.rest.append(&mut self.sorted);
+        self.rest.extend(keys);
+        self.refill();
+    }
+
+    fn refill(&mut self) {
+        let from = self.rest.len().saturating_sub(SOON);
+        if from > 0 {
+            self.rest.select_nth_unstable(from);
         }
+        self.sorted.extend(self.rest.drain(from..));
         self.sorted.sort_unstable();
     }
 
@@ -76,8 +85,11 @@ impl Queue {
     fn pop(&mut self) {
         if self.later.peek() > self.sorted.last() {
             self.later.pop();
-        } else {
-            self.sorted.pop();
+            return;
+        }
+        self.sorted.pop();
+        if self.sorted.is_empty() {
+            self.refill();
         }
     }
 
@@ -211,8 +223,10 @@ impl RoamFlight<'_> {
                 }
             }
         }
-        let (top, last) = self.next();
-        self.border = top.or(last).map_or(border, Key::number).max(tolerance);
+        if !stopped {
+            let (top, last) = self.next();
+            self.border = top.or(last).map_or(border, Key::number).max(tolerance);
+        }
         stopped
     }
 
