@@ -7,7 +7,7 @@ use crate::talk::{Failure, Talk, tidy};
 use clap::ValueEnum;
 use glam::DVec3;
 use littoral::field::{HeightField, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, Nested, Patches, Quadtree, Reached, Roam, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Nested, Patches, Quadtree, Reached, Roam, Strips, Whole};
 use littoral::space::View;
 use std::time::Instant;
 
@@ -42,6 +42,8 @@ pub enum Method {
     Quadtree,
     /// Triangles cut level by level, edges deciding
     Patches,
+    /// Strips along rows whose cells change size on the way
+    Strips,
     /// A bintree of right triangles, the worst split first
     Roam,
 }
@@ -54,6 +56,7 @@ impl Method {
             Method::Nested => Box::new(Nested::new(limits)),
             Method::Quadtree => Box::new(Quadtree::new(limits)),
             Method::Patches => Box::new(Patches::new(limits)),
+            Method::Strips => Box::new(Strips::new(limits)),
             Method::Roam => Box::new(Roam::new(limits)),
         }
     }

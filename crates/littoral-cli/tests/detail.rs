@@ -28,7 +28,7 @@ fn a_mesh_is_drawn_within_its_tolerance() {
     };
     let (exact, plain) = draw("exact.png", &[]);
     assert!(exact.get("triangles").is_none(), "no mesh was asked for");
-    for method in ["nested", "quadtree", "patches", "roam"] {
+    for method in ["nested", "quadtree", "patches", "strips", "roam"] {
         let (fine, picture) = draw("mesh.png", &["--lod", method, "--tolerance", "2"]);
         let (coarse, _) = draw("coarse.png", &["--lod", method, "--tolerance", "8"]);
         for (answer, tolerance) in [(&fine, 2.0), (&coarse, 8.0)] {
@@ -59,5 +59,5 @@ fn what_makes_no_mesh_is_refused() {
     fails(&["render", "--lod", "quadtree", "--triangles", "0"], 2, "--triangles");
     fails(&["render", "--wireframe"], 2, "--lod <METHOD>");
     fails(&["render", "--lod", "quadtree", "--path", "orbit"], 2, "cannot be used with '--path");
-    fails(&["render", "--lod", "clipmap"], 2, "[possible values: whole, nested, quadtree, patches, roam]");
+    fails(&["render", "--lod", "clipmap"], 2, "[possible values: whole, nested, quadtree, patches, strips, roam]");
 }

@@ -9,7 +9,7 @@
 
 use glam::{UVec2, Vec3};
 use littoral::field::{Water, coast};
-use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Roam, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Roam, Strips, Whole};
 use littoral::picture::{Display, Exposure, Meshes, Scene, Settings, Stage, Sun, mesh_errors};
 use littoral::space::View;
 use std::error::Error;
@@ -29,11 +29,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let view = View { tolerance_pixels: tolerance, ..coast::view(size) };
 
     let limits = Limits { finest: stage.land().finest_level(), triangles: 1_000_000 };
-    let methods: [(&str, Box<dyn Lod>); 5] = [
+    let methods: [(&str, Box<dyn Lod>); 6] = [
         ("whole", Box::new(Whole::new(limits))),
         ("nested", Box::new(Nested::new(limits))),
         ("quadtree", Box::new(Quadtree::new(limits))),
         ("patches", Box::new(Patches::new(limits))),
+        ("strips", Box::new(Strips::new(limits))),
         ("roam", Box::new(Roam::new(limits))),
     ];
     let settings = Settings { samples: 16, ..Settings::default() };

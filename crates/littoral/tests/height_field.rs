@@ -4,7 +4,7 @@
 
 use glam::DVec2;
 use littoral::field::noise::{Fbm, NoiseField};
-use littoral::field::{HeightField, Land, Raster, Sea, Window};
+use littoral::field::{HeightField, HeightRange, Land, Raster, Sea, Window};
 use littoral::space::{Cell, Datum, Place};
 use littoral::waves::{SeaState, Superposition};
 use proptest::prelude::*;
@@ -48,6 +48,13 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
             let most = finer.into_iter().map(|cell| field.error(cell)).fold(0.0, f32::max);
             assert_eq!(field.stencil_error(cell, depth), most, "{cell:?}: {depth} levels below");
         }
+        let count = (side - cell.x).min(5) as usize;
+        let (mut ranges, mut errors) = ([HeightRange::EMPTY; 5], [f32::NAN; 5]);
+        field.row(cell, &mut ranges[..count], &mut errors[..count]);
+        for i in 0..count {
+            let cell = Cell { x: cell.x + i as u32, ..cell };
+            assert_eq!((ranges[i], errors[i]), (field.range(cell), field.error(cell)), "{cell:?} in a row");
+        }
         let at = |u: f64, v: f64| Place { face: 0, uv: cell.low_corner().uv + DVec2::new(u, v) * cell.side() };
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|(u, v)| field.height(at(u, v)));
         let slack = corners.iter().flatten().fold(1.0f32, |m, h| m.max(h.abs())) * 8.0 * f32::EPSILON;
@@ -63,6 +70,9 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
             let Some(height) = field.height(at(u, v)) else { continue };
             let slack = slack.max(height.abs() * 8.0 * f32::EPSILON);
             assert_eq!(field.height(at(u, v)), Some(height), "asked twice");
+            let mut bulk = [f32::NAN];
+            field.heights(&[at(u, v)], &mut bulk);
+            assert_eq!(bulk, [height], "{cell:?} at ({u}, {v}): asked in bulk");
             // On its border a cell that is void, or partly so, may meet its neighbour's surface where it has none itself.
             let inside = u > 0.0 && u < 1.0 && v > 0.0 && v < 1.0;
             if !inside && (error.is_infinite() || range.is_empty()) {

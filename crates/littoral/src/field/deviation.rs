@@ -71,6 +71,20 @@ impl ErrorPyramid {
         }
     }
 
+    /// The same for cells in a row, `first` being the westernmost, each a square of several patches; `false` if they are smaller.
+    pub(super) fn row(&self, first: Cell, errors: &mut [f32]) -> bool {
+        let Some(k) = self.finest.checked_sub(first.level).filter(|&k| k > 0) else { return false };
+        let level = &self.levels[usize::from(k) - 1];
+        let (column, row) = (first.x as usize, first.y as usize);
+        let inside = if row < level.rows { level.columns.saturating_sub(column).min(errors.len()) } else { 0 };
+        let (within, beyond) = errors.split_at_mut(inside);
+        if inside > 0 {
+            within.copy_from_slice(&level.bounds[row * level.columns + column..][..inside]);
+        }
+        beyond.fill(0.0);
+        true
+    }
+
     /// The greatest bound (m) of the cells `depth` levels below `cell`: see [`HeightField::stencil_error`](super::HeightField::stencil_error).
     pub fn finer(&self, raster: &Raster, cell: Cell, depth: u8) -> f32 {
         let Some(k) = self.finest.checked_sub(cell.level + depth).filter(|&k| k > 0) else {
@@ -200,7 +214,7 @@ fn patch_twist(raster: &Raster, column: usize, row: usize) -> Option<f32> {
     Some(quarter_twist([at(0, 0)?, at(1, 0)?, at(0, 1)?, at(1, 1)?]))
 }
 
-fn quarter_twist([a, b, c, d]: [f32; 4]) -> f32 {
+pub(super) fn quarter_twist([a, b, c, d]: [f32; 4]) -> f32 {
     // Three roundings of differences, paid for by one part in two million of the heights.
     let size = a.abs().max(b.abs()).max(c.abs().max(d.abs()));
     0.25 * ((a - b) - (c - d)).abs() + size * f32::EPSILON

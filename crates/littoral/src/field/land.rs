@@ -4,6 +4,7 @@
 //! face of the land's datum is the raster padded to 2ᵏ × 2ᵏ patches, so that cells of level k are exactly the patches and
 //! every cell's corners lie on samples; the padding is void and never shows.
 
+use super::deviation::quarter_twist;
 use super::pyramid::window_range;
 use super::{ErrorPyramid, HeightField, HeightRange, RangePyramid, Raster, Window};
 use crate::space::{Cell, Datum, Place};
@@ -146,6 +147,28 @@ impl Land {
         self.ranges.edited(&self.raster, window, before);
     }
 
+    /// Ranges and errors of patches in a row, of land without voids.
+    fn patches(&self, column: usize, row: usize, ranges: &mut [HeightRange], errors: &mut [f32]) {
+        let (columns, rows) = (self.raster.columns(), self.raster.rows());
+        let inside = if row + 1 < rows { (columns - 1).saturating_sub(column).min(ranges.len()) } else { 0 };
+        ranges[inside..].fill(HeightRange::EMPTY);
+        errors[inside..].fill(0.0);
+        if inside == 0 {
+            return;
+        }
+        let south = &self.raster.heights()[row * columns + column..][..inside + 1];
+        let north = &self.raster.heights()[(row + 1) * columns + column..][..inside + 1];
+        let corners = south.windows(2).zip(north.windows(2));
+        for ((range, error), (south, north)) in ranges.iter_mut().zip(errors).zip(corners) {
+            let [a, b, c, d] = [south[0], south[1], north[0], north[1]];
+            let size = a.abs().max(b.abs()).max(c.abs().max(d.abs()));
+            let slack = 1e-6 * f64::from(size);
+            let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+            *range = HeightRange { low: (f64::from(low) - slack) as f32, high: (f64::from(high) + slack) as f32 };
+            *error = quarter_twist([a, b, c, d]);
+        }
+    }
+
     /// Range of the surface over a part of one patch, `from` and `to` being positions within it. Over a rectangle a
     /// bilinear function takes its extremes in the corners.
     fn part_range(&self, column: usize, row: usize, from: DVec2, to: DVec2) -> HeightRange {
@@ -199,6 +222,39 @@ impl HeightField for Land {
 
     fn error(&self, cell: Cell) -> f32 {
         self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest)).error(&self.raster, cell)
+    }
+
+    fn row(&self, first: Cell, ranges: &mut [HeightRange], errors: &mut [f32]) {
+        assert_eq!(ranges.len(), errors.len(), "expected as many ranges as errors");
+        let pyramid = self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest));
+        if pyramid.row(first, errors) {
+            self.ranges.nodes(u32::from(self.finest - first.level), first.x as usize, first.y as usize, ranges);
+        } else if first.level == self.finest && !self.raster.voids().any() {
+            self.patches(first.x as usize, first.y as usize, ranges, errors);
+        } else {
+            for (i, (range, error)) in ranges.iter_mut().zip(errors).enumerate() {
+                let cell = Cell { x: first.x + i as u32, ..first };
+                (*range, *error) = (self.range(cell), pyramid.error(&self.raster, cell));
+            }
+        }
+    }
+
+    fn heights(&self, places: &[Place], heights: &mut [f32]) {
+        assert_eq!(places.len(), heights.len(), "expected as many heights as places");
+        let steps = f64::from(1u32 << self.finest);
+        let (columns, rows) = (self.raster.columns() as u32, self.raster.rows() as u32);
+        let (samples, voids) = (self.raster.heights(), self.raster.voids().any());
+        for (place, height) in places.iter().zip(heights) {
+            let at = place.uv * steps;
+            let (column, row) = (at.x as u32, at.y as u32);
+            // Vertices lie on samples: nothing to be interpolated there.
+            let on_sample = f64::from(column) == at.x && f64::from(row) == at.y && column < columns && row < rows;
+            *height = if on_sample && !voids {
+                samples[row as usize * columns as usize + column as usize]
+            } else {
+                self.height(*place).unwrap_or(f32::NAN)
+            };
+        }
     }
 
     fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {

@@ -84,6 +84,18 @@ pub trait HeightField: Sync {
         cell.children().into_iter().fold(0.0, |most, child| self.stencil_error(child, depth - 1).max(most))
     }
 
+    /// Ranges and errors of cells in a row, `first` being the westernmost. Overridden where bulk is faster.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    fn row(&self, first: Cell, ranges: &mut [HeightRange], errors: &mut [f32]) {
+        assert_eq!(ranges.len(), errors.len(), "expected as many ranges as errors");
+        for (i, (range, error)) in ranges.iter_mut().zip(errors).enumerate() {
+            let cell = Cell { x: first.x + i as u32, ..first };
+            (*range, *error) = (self.range(cell), self.error(cell));
+        }
+    }
+
     /// `side` × `side` heights over `cell`, its borders included, row by row from the south-west; NaN where void.
     ///
     /// # Panics

@@ -129,6 +129,23 @@ impl RangePyramid {
         HeightRange { low: self.height(low), high: self.height(high) }
     }
 
+    /// The same for nodes in a row, from `column` on.
+    ///
+    /// # Panics
+    /// If there is no such level.
+    pub(crate) fn nodes(&self, level: u32, column: usize, row: usize, ranges: &mut [HeightRange]) {
+        let here = self.levels[level as usize - 1];
+        let inside = if row < here.rows { here.columns.saturating_sub(column).min(ranges.len()) } else { 0 };
+        let (within, beyond) = ranges.split_at_mut(inside);
+        beyond.fill(HeightRange::EMPTY);
+        let first = here.offset + if inside > 0 { row * here.columns + column } else { 0 };
+        let steps = self.lows[first..][..inside].iter().zip(&self.highs[first..][..inside]);
+        for (range, (&low, &high)) in within.iter_mut().zip(steps) {
+            let some = HeightRange { low: self.height(low), high: self.height(high) };
+            *range = if low > high { HeightRange::EMPTY } else { some };
+        }
+    }
+
     /// The height (m) that a number of steps stands for.
     #[inline]
     pub(crate) fn height(&self, steps: u16) -> f32 {

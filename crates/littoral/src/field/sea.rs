@@ -408,6 +408,11 @@ impl HeightField for Sea {
         self.error(Cell { level: cell.level + finer, x: cell.x << finer, y: cell.y << finer, ..cell })
     }
 
+    fn row(&self, first: Cell, ranges: &mut [HeightRange], errors: &mut [f32]) {
+        ranges.fill(self.range(first));
+        errors.fill(self.error(first));
+    }
+
     fn heights(&self, places: &[Place], heights: &mut [f32]) {
         assert_eq!(places.len(), heights.len(), "expected as many heights as places");
         places.par_chunks(BLOCK).zip(heights.par_chunks_mut(BLOCK)).with_min_len(64).for_each(|(places, heights)| {

@@ -141,6 +141,10 @@ pub struct Drawing {
     pub patches: Vec<Patch>,
     /// Triangles beside the patches.
     pub mesh: Mesh,
+    /// Strips of triangles: each ends before the vertex named, and begins where the one before it ends, the first with the mesh's first vertex. In a
+    /// strip, every three vertices in a row are a triangle, the first counter-clockwise seen from above, the second clockwise, and so on; those of which two vertices are
+    /// the same are none.
+    pub strips: Vec<u32>,
     places: Vec<Place>,
     heights: Vec<f32>,
 }
@@ -152,6 +156,7 @@ impl Drawing {
     /// Removes everything, keeping the memory.
     pub fn clear(&mut self) {
         self.patches.clear();
+        self.strips.clear();
         self.mesh.clear();
     }
 
@@ -161,11 +166,24 @@ impl Drawing {
             Stencil::Square(n) => 2 * (n * n) as usize,
             Stencil::Triangle => 1,
         };
-        self.patches.len() * each + self.mesh.triangles.len()
+        let strips = self.strips.last().map_or(0, |&end| end as usize - 2 * self.strips.len());
+        self.patches.len() * each + strips + self.mesh.triangles.len()
     }
 
-    /// Turns the patches into triangles of the mesh, with heights of `field`, and removes them. Triangles that would reach into a void are left out.
+    /// Turns the patches into triangles of the mesh, with heights of `field`, and removes them; so it does with strips. Triangles that would reach into a
+    /// void are left out.
     pub fn expand(&mut self, field: &dyn HeightField) {
+        let mut begin = 0;
+        for end in self.strips.drain(..) {
+            let vertices = &self.mesh.vertices;
+            let corners = (begin..end.saturating_sub(2))
+                .map(|i| if (i - begin) & 1 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] });
+            self.mesh.triangles.extend(corners.filter(|triangle| {
+                let [a, b, c] = triangle.map(|i| [vertices[i as usize].x, vertices[i as usize].y]);
+                a != b && b != c && c != a
+            }));
+            begin = end;
+        }
         let n = match self.stencil {
             Stencil::Square(n) => n,
             Stencil::Triangle => 1,

@@ -17,6 +17,7 @@ mod nested;
 mod patches;
 mod quadtree;
 mod roam;
+mod strips;
 mod whole;
 
 pub use drawing::{Drawing, Edge, Mesh, Patch, Stencil, Vertex};
@@ -25,6 +26,7 @@ pub use nested::{Nested, Seams};
 pub use patches::Patches;
 pub use quadtree::Quadtree;
 pub use roam::{Disc, Factors, NestedBounds, Priority, Roam, RoamFlight, RoamOnce, TooManySamples};
+pub use strips::Strips;
 pub use whole::Whole;
 
 use crate::field::HeightField;

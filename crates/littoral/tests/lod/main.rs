@@ -1,7 +1,7 @@
 //! The conformance suite of [`Lod`]: what the trait promises, asked of every method.
 //!
 //! A new method joins by one line in `METHODS`. `LITTORAL_CASES` says how many random cases each method gets (default 60),
-//! `LITTORAL_FIRST` the first seed.
+//! `LITTORAL_FIRST` the first seed, `LITTORAL_METHOD` the only method to get any.
 
 #![allow(missing_docs)]
 
@@ -15,7 +15,7 @@ use check::{Case, check};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::{Fbm, NoiseField};
 use littoral::field::{HeightField, Land, Raster, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Roam, Seams, ViewError, Whole};
+use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Roam, Seams, Strips, ViewError, Whole};
 use littoral::space::{Datum, View};
 use littoral::waves::{SeaState, Superposition};
 
@@ -52,6 +52,7 @@ pub const METHODS: &[Method] = &[
     Method { name: "nested, morphing", make: |limits| nested(limits, Seams::Morphing) },
     Method { name: "quadtree", make: |limits| Box::new(Quadtree::new(limits)) },
     Method { name: "patches", make: |limits| Box::new(Patches::new(limits)) },
+    Method { name: "strips", make: |limits| Box::new(Strips::new(limits)) },
     Method { name: "roam", make: |limits| Box::new(Roam::new(limits)) },
 ];
 
@@ -174,7 +175,8 @@ pub fn cases() -> std::ops::Range<u64> {
 #[test]
 fn random_views_of_random_surfaces() {
     use rayon::prelude::*;
-    for method in METHODS {
+    let only = std::env::var("LITTORAL_METHOD").ok();
+    for method in METHODS.iter().filter(|method| only.as_ref().is_none_or(|only| only == method.name)) {
         cases().into_par_iter().for_each(|seed| {
             let mut random = Random::new(seed);
             let surface = random_surface(&mut random);

@@ -1,0 +1,404 @@
+//! Strips made on the fly: nothing is prepared, no mesh is kept, and what comes out are strips of triangles.
+//!
+//! The face is divided into *pages*, squares of 64 × 64 cells; those that may be seen are walked, the nearest first, each row by row, and their rows become
+//! strips whose cells change size on the way ([`walk`](self::walk)). The walk is that of M. Finch and L. Bishop as V. Kapustin, V. Eruhimov and
+//! A. Malashkina published it (GraphiCon 2001), with its five ways to cut a cell. Theirs decides on the level of a
+//! cell while it walks, from the strip before; here the bounds decide first, for all pages at once, a bit a cell ([`page`](self::page)), so that
+//! pages can be walked in any order, by many threads, and the bound holds. Where the land goes deeper than a page, pages lie within pages.
+//!
+//! A vertex that a side leaves out is off by no more than the coarser cell beside it: where a cell's own bound is held to half the tolerance, and
+//! counted with the nearest of its neighbours, cells and seams together keep it.
+
+mod page;
+mod walk;
+
+use super::drawing::{STEPS, Vertex};
+use super::{Drawing, Limits, Lod, Reached, ScreenMetric, ViewError};
+use crate::field::HeightField;
+use crate::space::{Cell, Datum, Place, View};
+use glam::DVec2;
+use page::{Asked, DEPTH, Page, SEAMS, halve};
+use rayon::prelude::*;
+use rustc_hash::FxHashMap;
+use walk::{Beyond, Rows, Walk};
+
+/// Strips of triangles, page by page.
+#[derive(Clone, Debug)]
+pub struct Strips {
+    /// Where it ends though the tolerance is not met.
+    pub limits: Limits,
+    /// Pages by size, the largest first.
+    tiers: Vec<Tier>,
+    /// Tier and number of pages, the nearest first, with their distances.
+    order: Vec<(f64, u32, u32)>,
+    walked: Vec<Walked>,
+}
+
+/// Pages of one size.
+#[derive(Clone, Debug, Default)]
+struct Tier {
+    depth: u8,
+    pages: Vec<Page>,
+    index: FxHashMap<[u32; 2], u32>,
+}
+
+/// What a walk brings home.
+#[derive(Clone, Debug, Default)]
+struct Walked {
+    rows: Rows,
+    vertices: Vec<Vertex>,
+    ends: Vec<u32>,
+    slivers: Vec<[Vertex; 3]>,
+}
+
+/// Pages fewer than these are not worth other threads.
+const FEW: usize = 64;
+
+/// Pages that are walked one after the other.
+const TOGETHER: usize = 16;
+
+impl Tier {
+    fn clear(&mut self, depth: u8) {
+        self.depth = depth;
+        self.pages.clear();
+        self.index.clear();
+    }
+
+    /// The page over a cell, made if it is not there.
+    fn page(&mut self, cell: Cell) -> &mut Page {
+        let Tier { depth, pages, index } = self;
+        let number = *index.entry([cell.x, cell.y]).or_insert_with(|| {
+            pages.push(Page::of(cell, *depth));
+            pages.len() as u32 - 1
+        });
+        &mut pages[number as usize]
+    }
+
+    fn find(&self, x: u32, y: u32) -> Option<&Page> {
+        self.index.get(&[x, y]).map(|&number| &self.pages[number as usize])
+    }
+
+    /// Does something with every page, on several threads if there are many.
+    fn each<T: Send>(&mut self, work: impl Fn(&mut Page) -> T + Sync + Send, join: fn(T, T) -> T) -> Option<T> {
+        if self.pages.len() < FEW {
+            self.pages.iter_mut().map(work).reduce(join)
+        } else {
+            self.pages.par_iter_mut().map(work).reduce_with(join)
+        }
+    }
+}
+
+impl Strips {
+    /// The method within limits.
+    pub fn new(limits: Limits) -> Strips {
+        Strips { limits, tiers: Vec::new(), order: Vec::new(), walked: Vec::new() }
+    }
+
+    /// Cuts what `tolerance` asks for, and what neighbours then need; the bound reached (pixels) and the number of cells, or, if that takes more
+    /// triangles than allowed, about how many cells it would have been.
+    fn refine(
+        &mut self,
+        field: &dyn HeightField,
+        metric: &ScreenMetric,
+        tolerance: f32,
+    ) -> Result<(f32, usize), usize> {
+        let finest = self.limits.finest.min(Cell::MAX_LEVEL);
+        let asked = Asked { field, metric, tolerance, finest };
+        // Pages end at the finest level; the first takes what is left above them.
+        let tiers = usize::from(finest.div_ceil(DEPTH));
+        self.tiers.resize_with(tiers.max(self.tiers.len()), Tier::default);
+        self.tiers.truncate(tiers);
+        for (i, tier) in self.tiers.iter_mut().enumerate() {
+            tier.clear(if i == 0 { finest - DEPTH * (tiers as u8 - 1) } else { DEPTH });
+        }
+        let face = Cell::face(0);
+        let mut worst = SEAMS * metric.cell(field, face, field.error(face)).map_or(0.0, |(_, pixels)| pixels);
+        if worst <= tolerance || finest == 0 {
+            return Ok((worst, 1));
+        }
+        self.tiers[0].page(face);
+        worst = 0.0;
+        let most = 4 * self.limits.triangles.max(64);
+        for i in 0..tiers {
+            let (coarse, fine) = self.tiers.split_at_mut(i + 1);
+            let tier = &mut coarse[i];
+            worst = tier.each(|page| page.refine(&asked), f32::max).map_or(worst, |bound| bound.max(worst));
+            let mut cut = 0;
+            for page in &tier.pages {
+                cut += page.cut.iter().map(|bits| bits.count_ones() as usize).sum::<usize>();
+                let Some(fine) = fine.first_mut() else { continue };
+                for_bits(page, |cell| _ = fine.page(cell));
+            }
+            if 6 * cut > most {
+                return Err(3 * cut);
+            }
+        }
+        self.balance();
+        let mut cells = 0;
+        for tier in &mut self.tiers {
+            let settle = |page: &mut Page| {
+                page.settle(&asked);
+                page.count()
+            };
+            cells += tier.each(settle, |a, b| a + b).unwrap_or(0);
+        }
+        if 2 * cells > self.limits.triangles && cells > 4 { Err(cells) } else { Ok((worst, cells)) }
+    }
+
+    /// Refines as far as the tolerance asks and the limits allow; the bound reached (pixels).
+    fn fit(&mut self, field: &dyn HeightField, metric: &ScreenMetric) -> f32 {
+        let most = self.limits.triangles.max(8);
+        let mut least = metric.tolerance();
+        let mut fits = least;
+        let (mut pixels, mut cells) = loop {
+            match self.refine(field, metric, fits) {
+                Ok(reached) => break reached,
+                Err(cells) => {
+                    // Triangles are about as many as the inverse of the bound.
+                    least = fits;
+                    fits *= (2.0 * cells as f32 / most as f32).powf(0.7).clamp(1.1, 10.0);
+                }
+            }
+        };
+        // Not much of what is allowed is left over.
+        let mut stands = true;
+        for _ in 0..4 {
+            if fits == least || 2 * cells >= most / 8 * 7 {
+                break;
+            }
+            let middle = (least * fits).sqrt();
+            match self.refine(field, metric, middle) {
+                Ok(reached) => ((pixels, cells), fits, stands) = (reached, middle, true),
+                Err(_) => (least, stands) = (middle, false),
+            }
+        }
+        if !stands {
+            _ = self.refine(field, metric, fits);
+        }
+        pixels
+    }
+
+    /// Cuts more until neighbours differ by one level at most.
+    fn balance(&mut self) {
+        for i in (0..self.tiers.len()).rev() {
+            let (coarse, fine) = self.tiers.split_at_mut(i + 1);
+            let tier = &mut coarse[i];
+            // What lies below a page is cut.
+            if let Some(fine) = fine.first() {
+                let up = tier.depth;
+                for page in &fine.pages {
+                    let (x, y) = (page.cell.x, page.cell.y);
+                    let above = Cell { level: page.cell.level - up, x: x >> up, y: y >> up, ..page.cell };
+                    let mask = (1u32 << up) - 1;
+                    tier.page(above).cut[page::row(up, y & mask)] |= 1 << (x & mask);
+                }
+            }
+            for level in (1..=tier.depth).rev() {
+                let mut number = 0;
+                while number < tier.pages.len() {
+                    tier.grow(number, level);
+                    number += 1;
+                }
+            }
+        }
+    }
+}
+
+/// The cells of a page's last level that are cut.
+fn for_bits(page: &Page, mut each: impl FnMut(Cell)) {
+    for y in 0..1u32 << page.depth {
+        let mut bits = page.cut[page::row(page.depth, y)];
+        while bits != 0 {
+            let x = bits.trailing_zeros();
+            bits &= bits - 1;
+            let level = page.cell.level + page.depth;
+            each(Cell { level, x: (page.cell.x << page.depth) + x, y: (page.cell.y << page.depth) + y, ..page.cell });
+        }
+    }
+}
+
+impl Tier {
+    /// Cuts the parents of all that lies beside what is cut on a level of a page.
+    fn grow(&mut self, number: usize, level: u8) {
+        let side = 1u32 << level;
+        let all = u64::MAX >> (64 - side);
+        let cell = self.pages[number].cell;
+        let cells = 1u32 << cell.level;
+        let half = side / 2;
+        for y in 0..side {
+            let page = &mut self.pages[number];
+            let bits = page.cut[page::row(level, y)];
+            if bits == 0 {
+                continue;
+            }
+            page.cut[page::row(level - 1, y >> 1)] |= halve((bits | bits << 1 | bits >> 1) & all);
+            for beyond in [y.checked_sub(1), Some(y + 1).filter(|&y| y < side)].into_iter().flatten() {
+                page.cut[page::row(level - 1, beyond >> 1)] |= halve(bits);
+            }
+            let first = y == 0 && cell.y > 0;
+            let last = y == side - 1 && cell.y + 1 < cells;
+            if first {
+                self.page(Cell { y: cell.y - 1, ..cell }).cut[page::row(level - 1, half - 1 + u32::from(half == 0))] |=
+                    halve(bits);
+            }
+            if last {
+                self.page(Cell { y: cell.y + 1, ..cell }).cut[page::row(level - 1, 0)] |= halve(bits);
+            }
+            if bits & 1 == 1 && cell.x > 0 {
+                self.page(Cell { x: cell.x - 1, ..cell }).cut[page::row(level - 1, y >> 1)] |= 1 << (half.max(1) - 1);
+            }
+            if bits >> (side - 1) & 1 == 1 && cell.x + 1 < cells {
+                self.page(Cell { x: cell.x + 1, ..cell }).cut[page::row(level - 1, y >> 1)] |= 1;
+            }
+        }
+    }
+}
+
+impl Default for Strips {
+    fn default() -> Strips {
+        Strips::new(Limits::default())
+    }
+}
+
+impl Lod for Strips {
+    fn select(&mut self, field: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Reached, ViewError> {
+        let metric = ScreenMetric::on_plane(view, field.datum())?;
+        drawing.clear();
+        if metric.cell(field, Cell::face(0), 0.0).is_none() {
+            return Ok(Reached { pixels: 0.0, limited: false });
+        }
+        let pixels = self.fit(field, &metric);
+        self.walk(field, &metric, view, drawing);
+        Ok(Reached { pixels, limited: pixels > metric.tolerance() })
+    }
+}
+
+impl Strips {
+    /// Walks over all pages, the nearest first.
+    fn walk(&mut self, field: &dyn HeightField, metric: &ScreenMetric, view: &View, drawing: &mut Drawing) {
+        let (origin, size) = match field.datum() {
+            Datum::Plane { origin, size } => (origin, size),
+            Datum::Ellipsoid { .. } => (DVec2::ZERO, DVec2::ONE),
+        };
+        let turned = metric.lens().0.y < 0.0;
+        let eye = (view.eye.truncate() - origin) / size;
+        self.order.clear();
+        for (i, tier) in self.tiers.iter().enumerate() {
+            for (number, page) in tier.pages.iter().enumerate() {
+                let (low, side) = (page.cell.low_corner().uv, page.cell.side());
+                let away = (eye - eye.clamp(low, low + side)) * size;
+                self.order.push((away.length_squared(), i as u32, number as u32));
+            }
+        }
+        self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        if self.order.is_empty() {
+            // One cell is all there is.
+            if field.error(Cell::face(0)).is_finite() {
+                let corners = [[0, STEPS], [0, 0], [STEPS, STEPS], [STEPS, 0]];
+                drawing.mesh.vertices.extend(corners.map(|[x, y]| Vertex { x, y, face: 0, height: 0.0 }));
+                drawing.strips.push(4);
+                lift(field, &mut drawing.mesh.vertices);
+            }
+            return;
+        }
+        let (tiers, order) = (&self.tiers, &self.order);
+        if order.len() < FEW || rayon::current_num_threads() == 1 {
+            let walked = one(&mut self.walked);
+            for pages in order.chunks(TOGETHER) {
+                walked.pages(tiers, pages, turned, field, &mut drawing.mesh.vertices, &mut drawing.strips);
+            }
+            return;
+        }
+        let parties = order.len().div_ceil(TOGETHER);
+        self.walked.resize_with(parties.max(self.walked.len()), Walked::default);
+        self.walked.par_iter_mut().zip(order.par_chunks(TOGETHER)).for_each(|(walked, pages)| {
+            let (mut vertices, mut ends) = (std::mem::take(&mut walked.vertices), std::mem::take(&mut walked.ends));
+            vertices.clear();
+            ends.clear();
+            walked.pages(tiers, pages, turned, field, &mut vertices, &mut ends);
+            (walked.vertices, walked.ends) = (vertices, ends);
+        });
+        for walked in &self.walked[..parties] {
+            let base = drawing.mesh.vertices.len() as u32;
+            drawing.mesh.vertices.extend_from_slice(&walked.vertices);
+            drawing.strips.extend(walked.ends.iter().map(|end| base + end));
+        }
+    }
+}
+
+/// The first of those who walk.
+fn one(walked: &mut Vec<Walked>) -> &mut Walked {
+    walked.resize_with(walked.len().max(1), Walked::default);
+    &mut walked[0]
+}
+
+impl Walked {
+    /// Walks over pages and adds what it finds.
+    fn pages(
+        &mut self,
+        tiers: &[Tier],
+        pages: &[(f64, u32, u32)],
+        turned: bool,
+        field: &dyn HeightField,
+        vertices: &mut Vec<Vertex>,
+        ends: &mut Vec<u32>,
+    ) {
+        for &(_, tier, number) in pages {
+            let begun = vertices.len();
+            self.page(tiers, [tier, number].map(|i| i as usize), turned, vertices, ends);
+            for sliver in self.slivers.drain(..) {
+                vertices.extend(sliver);
+                ends.push(vertices.len() as u32);
+            }
+            lift(field, &mut vertices[begun..]);
+        }
+    }
+
+    /// Walks over a page.
+    fn page(
+        &mut self,
+        tiers: &[Tier],
+        [tier, number]: [usize; 2],
+        turned: bool,
+        vertices: &mut Vec<Vertex>,
+        ends: &mut Vec<u32>,
+    ) {
+        let page = &tiers[tier].pages[number];
+        let Cell { x, y, level, face } = page.cell;
+        let beyond = [(0i64, -1i64), (1, 0), (0, 1), (-1, 0)].map(|(i, j)| {
+            let [x, y] = [i64::from(x) + i, i64::from(y) + j];
+            if !(0..1i64 << level).contains(&x) || !(0..1i64 << level).contains(&y) {
+                return Beyond::default();
+            }
+            let (x, y) = (x as u32, y as u32);
+            let page = tiers[tier].find(x, y);
+            let cell = page.is_none() && tier > 0 && {
+                let up = tiers[tier - 1].depth;
+                let mask = (1u32 << up) - 1;
+                let above = tiers[tier - 1].find(x >> up, y >> up);
+                above.is_some_and(|above| above.drawn[page::row(up, y & mask)] >> (x & mask) & 1 == 1)
+            };
+            Beyond { page, cell }
+        });
+        self.rows.load(page, beyond, turned);
+        let step = walk::step(page);
+        let side = step << page.depth;
+        let corner = [x, y].map(|at| (at + u32::from(turned)) * side);
+        let Walked { rows, slivers, .. } = self;
+        let begun = vertices.len();
+        Walk { rows, vertices, ends, corner, turned, face: face.into(), step, pen: None, begun, slivers }.run();
+    }
+}
+
+/// Gives vertices their heights.
+fn lift(field: &dyn HeightField, vertices: &mut [Vertex]) {
+    const SOME: usize = 256;
+    let mut places = [Place { face: 0, uv: DVec2::ZERO }; SOME];
+    let mut heights = [0.0; SOME];
+    for vertices in vertices.chunks_mut(SOME) {
+        let (places, heights) = (&mut places[..vertices.len()], &mut heights[..vertices.len()]);
+        places.iter_mut().zip(vertices.iter()).for_each(|(place, vertex)| *place = vertex.place());
+        field.heights(places, heights);
+        vertices.iter_mut().zip(heights).for_each(|(vertex, height)| vertex.height = *height);
+    }
+}
