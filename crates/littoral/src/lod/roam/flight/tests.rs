@@ -163,8 +163,9 @@ fn factors_move_triangles() {
     assert!(with > without, "the ridge is a silhouette: {with}, {without}");
     let (with, without) = counts(Factors { lighting: 3.0, ..off.clone() }, high, &|p| (p.y - 0.5).abs() < 0.1);
     assert!(with > without, "the hills' slopes differ most: {with}, {without}");
-    let disc = Disc { centre: DVec2::new(150.0, 100.0), radius: 12.0, factor: 50.0 };
-    let near = |p: DVec2| (p * DVec2::new(192.0, 128.0)).distance(disc.centre) < 15.0;
+    let centre = land.origin() + DVec2::new(150.0, 100.0);
+    let disc = Disc { centre, radius: 12.0, factor: 50.0 };
+    let near = |p: DVec2| (land.origin() + p * land.extent()).distance(centre) < 15.0;
     let (with, without) = counts(Factors { objects: vec![disc], ..off }, high, &near);
     assert!(with > without, "a thing stands there: {with}, {without}");
 }
