@@ -123,8 +123,8 @@ fn tiled<T: Copy + Send + Sync>(size: [u32; 2], empty: T, of: &(dyn Fn([u32; 2])
     let pages = [size[0].div_ceil(32), size[1].div_ceil(16)];
     let one = |at: u32| {
         let (page, tile) = (at >> 9, at >> 3 & 63);
-        let i = page % pages[0] << 5 | (tile & 7) << 2 | at & 3;
-        let j = page / pages[0] << 4 | tile >> 3 << 1 | at >> 2 & 1;
+        let i = (page % pages[0]) << 5 | (tile & 7) << 2 | at & 3;
+        let j = (page / pages[0]) << 4 | (tile >> 3) << 1 | at >> 2 & 1;
         if i < size[0] && j < size[1] { of([i, j]) } else { empty }
     };
     (0..pages[0] * pages[1] * 512).into_par_iter().with_min_len(64).map(one).collect()

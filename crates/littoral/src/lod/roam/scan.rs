@@ -408,8 +408,8 @@ fn within(numbers: &[f32], marked: bool, above: f32, most: f32, found: &mut Vec<
     };
     for numbers in chunks {
         let mut mask = 0u32;
-        for lane in 0..LANES {
-            mask |= fits(numbers[lane]) << lane;
+        for (lane, &number) in numbers.iter().enumerate() {
+            mask |= fits(number) << lane;
         }
         while mask != 0 {
             found.push(first + mask.trailing_zeros());

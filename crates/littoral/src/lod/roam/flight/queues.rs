@@ -234,8 +234,8 @@ impl RoamFlight<'_> {
     #[inline]
     fn foresee_splits(&self) {
         self.foresee_room();
-        for hop in 0..4 {
-            if let Some(key) = self.splits.coming(AHEAD[hop]) {
+        for (hop, ahead) in AHEAD.into_iter().enumerate() {
+            if let Some(key) = self.splits.coming(ahead) {
                 self.foresee_split(key.record(), hop);
             }
         }
@@ -244,8 +244,8 @@ impl RoamFlight<'_> {
     /// The same for merges.
     #[inline]
     fn foresee_merges(&self) {
-        for hop in 0..3 {
-            if let Some(key) = self.merges.coming(AHEAD[hop]) {
+        for (hop, ahead) in AHEAD.into_iter().take(3).enumerate() {
+            if let Some(key) = self.merges.coming(ahead) {
                 self.foresee_merge(key.reversed().record(), hop);
             }
         }
