@@ -2,7 +2,8 @@
 //!
 //! The face is two triangles; each can be bisected at the middle of its base, together with the one on the base's other side. A
 //! triangle's neighbour that is too coarse for that is split first (a *forced split*), so that no vertex ever lies on an edge. What is split
-//! next is what is drawn farthest from its place (Algorithm I): with the total order of [`Roam`] the outcome depends on the question alone.
+//! next is what is drawn farthest from its place (Algorithm I): with the total order of [`Roam`] the outcome depends on the question alone. Over prepared
+//! land, whose bounds are nested, [`RoamOnce`] finds the same without a queue, and [`RoamFlight`] changes it from view to view.
 //!
 //! *Bounds over any field.* A half of the cell P is at most `error(P)` off. A quarter of P, over one of its sides, becomes two halves of smaller cells C when
 //! that side's middle is raised into place: it is off by at most the greater `error(C)` and that middle's deviation; and by at most twice `error(P)`,
@@ -20,12 +21,16 @@
 
 mod bounds;
 mod diamond;
+mod factors;
 mod flight;
 mod scan;
+mod scratch;
 
 pub use bounds::{NestedBounds, TooManySamples};
+pub use factors::{Disc, Factors};
 pub use flight::RoamFlight;
 pub use scan::Priority;
+pub use scratch::RoamOnce;
 
 use super::{Drawing, Limits, Lod, Reached, ScreenMetric, Vertex, ViewError};
 use crate::field::HeightField;
@@ -33,6 +38,9 @@ use crate::space::{Place, View};
 use diamond::{Diamond, FINEST, Point, STEPS};
 use std::collections::{BinaryHeap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
+
+/// Corners of the face, the first four vertices: south-west, south-east, north-east, north-west.
+const CORNERS: [Point; 4] = [[0, 0], [STEPS, 0], [STEPS, STEPS], [0, STEPS]];
 
 /// ROAM over any height field, from scratch for each view.
 #[derive(Clone, Debug, Default)]
@@ -45,8 +53,49 @@ pub struct Roam {
     /// Nodes in the order in which they were split: parents before their children.
     split: Vec<u32>,
     forced: Vec<Diamond>,
+    surface: Heights,
+    /// Nodes whose split asks for heights that were not asked for yet.
+    fresh: Vec<u32>,
+}
+
+/// Heights of lattice points, each asked for once, and many together: a sea answers sixteen in the time of one.
+#[derive(Clone, Debug, Default)]
+struct Heights {
+    index: HashMap<u64, u32, BuildHasherDefault<Mixed>>,
     places: Vec<Place>,
-    heights: Vec<f32>,
+    /// NaN where void.
+    values: Vec<f32>,
+}
+
+impl Heights {
+    fn clear(&mut self) {
+        self.index.clear();
+        self.places.clear();
+        self.values.clear();
+    }
+
+    fn want(&mut self, at: Point) {
+        let places = &mut self.places;
+        self.index.entry(name(at)).or_insert_with(|| {
+            places.push(super::drawing::place(0, at));
+            places.len() as u32 - 1
+        });
+    }
+
+    fn ask(&mut self, field: &dyn HeightField) {
+        let known = self.values.len();
+        self.values.resize(self.places.len(), 0.0);
+        field.heights(&self.places[known..], &mut self.values[known..]);
+    }
+
+    /// The height of a point that was asked for.
+    fn at(&self, at: Point) -> f32 {
+        self.values[self.index[&name(at)] as usize]
+    }
+}
+
+fn name(at: Point) -> u64 {
+    Diamond { at, ..Diamond::ROOT }.name()
 }
 
 /// A diamond of which a triangle is there, or was until it was split.
@@ -63,6 +112,8 @@ struct Node {
     born: u32,
     /// How many splits there were before its own.
     split: u32,
+    /// Whether the heights that its split asks for are known.
+    foreseen: bool,
 }
 
 /// Not split, or not there.
@@ -92,8 +143,9 @@ impl Hasher for Mixed {
     }
 
     fn write_u64(&mut self, name: u64) {
-        let mixed = (self.0 ^ name).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        self.0 = mixed ^ (mixed >> 29);
+        // Names end in as many zeros as the lattice is finer than the mesh: both halves of the product, so that all bits tell in the lowest.
+        let product = u128::from(self.0 ^ name) * 0x9e37_79b9_7f4a_7c15;
+        self.0 = (product >> 64) as u64 ^ product as u64;
     }
 }
 
@@ -109,15 +161,32 @@ impl Roam {
             return node;
         }
         let node = self.nodes.len() as u32;
-        let (pixels, void, drawn) = ask.measure(diamond);
+        let (pixels, void, drawn) = ask.measure(diamond, &self.surface);
         let born = self.split.len() as u32;
-        self.nodes.push(Node { diamond, pixels, void, drawn, born, split: NEVER });
+        self.nodes.push(Node { diamond, pixels, void, drawn, born, split: NEVER, foreseen: false });
         self.index.insert(diamond.name(), node);
         if ask.splittable(diamond) && pixels > ask.metric.tolerance() {
             let level = std::cmp::Reverse(diamond.level());
             self.queue.push(Entry { pixels: pixels.to_bits(), level, name: diamond.name(), node });
+            self.fresh.push(node);
         }
         node
+    }
+
+    /// Asks for the heights that the split of a node needs, and with them for those of all that are likely to be split later.
+    fn foresee(&mut self, node: u32, field: &dyn HeightField) {
+        if self.nodes[node as usize].foreseen {
+            return;
+        }
+        self.fresh.push(node);
+        while let Some(node) = self.fresh.pop() {
+            let node = &mut self.nodes[node as usize];
+            if !std::mem::replace(&mut node.foreseen, true) && node.diamond.is_square() {
+                self.surface.want(node.diamond.at);
+                node.diamond.children().into_iter().flatten().for_each(|side| self.surface.want(side.at));
+            }
+        }
+        self.surface.ask(field);
     }
 
     fn is_split(&self, diamond: Diamond, before: u32) -> bool {
@@ -130,6 +199,10 @@ impl Roam {
         self.index.clear();
         self.queue.clear();
         self.split.clear();
+        self.fresh.clear();
+        self.surface.clear();
+        CORNERS.into_iter().for_each(|corner| self.surface.want(corner));
+        self.surface.ask(ask.field);
         self.node(Diamond::ROOT, ask);
         let (mut triangles, mut best) = (2, (f32::INFINITY, 0));
         loop {
@@ -162,6 +235,7 @@ impl Roam {
             for i in 0..self.forced.len() {
                 let diamond = self.forced[i];
                 let node = self.node(diamond, ask);
+                self.foresee(node, ask.field);
                 self.nodes[node as usize].split = self.split.len() as u32;
                 self.split.push(node);
                 for child in diamond.children().into_iter().flatten() {
@@ -183,28 +257,19 @@ impl Roam {
     }
 
     /// Writes the triangles that are there after `splits` splits.
-    fn draw(&mut self, splits: u32, field: &dyn HeightField, drawing: &mut Drawing) {
-        let corners = [[0, 0], [STEPS, 0], [STEPS, STEPS], [0, STEPS]];
-        let split = self.split[..splits as usize].iter().map(|&node| self.nodes[node as usize].diamond.at);
-        self.places.clear();
-        self.places.extend(corners.into_iter().chain(split).map(|at| super::drawing::place(0, at)));
-        self.heights.clear();
-        self.heights.resize(self.places.len(), 0.0);
-        field.heights(&self.places, &mut self.heights);
+    fn draw(&self, splits: u32, drawing: &mut Drawing) {
         let vertex = |at: Point| {
-            let corner = corners.iter().position(|&corner| corner == at);
-            corner.map_or_else(
-                || 4 + self.nodes[self.index[&Diamond { at, ..Diamond::ROOT }.name()] as usize].split,
-                |i| i as u32,
-            )
+            let corner = CORNERS.iter().position(|&corner| corner == at);
+            corner.map_or_else(|| 4 + self.nodes[self.index[&name(at)] as usize].split, |i| i as u32)
         };
         let split = self.split[..splits as usize].iter().map(|&node| self.nodes[node as usize].diamond.at);
-        drawing.mesh.vertices.extend(corners.into_iter().chain(split).zip(&self.heights).map(|(at, &height)| Vertex {
+        drawing.mesh.vertices.extend(CORNERS.into_iter().chain(split).map(|at| Vertex {
             x: at[0],
             y: at[1],
             face: 0,
-            height,
+            height: self.surface.at(at),
         }));
+        let super::Mesh { vertices, triangles } = &mut drawing.mesh;
         for node in self.nodes.iter().filter(|node| node.born <= splits && node.split >= splits) {
             for (apex, drawn) in node.diamond.apexes().into_iter().zip(node.drawn) {
                 let Some(apex) = apex else { continue };
@@ -213,8 +278,8 @@ impl Roam {
                     continue;
                 }
                 let triangle = node.diamond.triangle(apex).map(vertex);
-                if triangle.iter().all(|&v| !self.heights[v as usize].is_nan()) {
-                    drawing.mesh.triangles.push(triangle);
+                if triangle.iter().all(|&v| !vertices[v as usize].height.is_nan()) {
+                    triangles.push(triangle);
                 }
             }
         }
@@ -227,7 +292,7 @@ impl Lod for Roam {
         drawing.clear();
         let ask = Question { field, metric, finest: self.limits.finest.min(FINEST) };
         let splits = self.refine(&ask);
-        self.draw(splits, field, drawing);
+        self.draw(splits, drawing);
         Ok(self.reached(splits, &ask))
     }
 }
@@ -246,7 +311,7 @@ impl Question<'_> {
     }
 
     /// The bound of a diamond (pixels), whether any of it is partly void, and which of its triangles can be drawn.
-    fn measure(&self, diamond: Diamond) -> (f32, bool, [bool; 2]) {
+    fn measure(&self, diamond: Diamond, surface: &Heights) -> (f32, bool, [bool; 2]) {
         let (mut pixels, mut void, mut drawn) = (0.0f32, false, [false; 2]);
         for (apex, drawn) in diamond.apexes().into_iter().zip(&mut drawn) {
             let Some(apex) = apex else { continue };
@@ -254,7 +319,7 @@ impl Question<'_> {
             let (range, error) = if diamond.is_square() {
                 (self.field.range(cell), self.field.error(cell))
             } else {
-                self.quarter(diamond, apex)
+                self.quarter(diamond, apex, surface)
             };
             if range.is_empty() {
                 continue;
@@ -289,7 +354,7 @@ impl Question<'_> {
     }
 
     /// Heights and error of the triangle over a side towards `apex`.
-    fn quarter(&self, diamond: Diamond, apex: Point) -> (crate::field::HeightRange, f32) {
+    fn quarter(&self, diamond: Diamond, apex: Point, surface: &Heights) -> (crate::field::HeightRange, f32) {
         let halves = self.halves(diamond, apex);
         let ranges = halves.map(|half| self.field.range(half));
         let range = ranges[0].union(ranges[1]);
@@ -301,8 +366,10 @@ impl Question<'_> {
             return (range, error);
         }
         let [a, b] = diamond.ends();
-        let [a, m, b] = [a, diamond.at, b].map(|at| self.field.height(super::drawing::place(0, at)));
-        let (Some(a), Some(m), Some(b)) = (a, m, b) else { return (range, f32::INFINITY) };
+        let [a, m, b] = [a, diamond.at, b].map(|at| surface.at(at));
+        if a.is_nan() || m.is_nan() || b.is_nan() {
+            return (range, f32::INFINITY);
+        }
         let deviation = (m - 0.5 * (a + b)).abs() + 4.0 * f32::EPSILON * a.abs().max(b.abs()).max(m.abs());
         let whole = self.field.error(diamond.cell(apex));
         (range, (error + deviation).min(2.0 * whole))

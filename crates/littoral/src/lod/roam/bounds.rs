@@ -7,8 +7,11 @@
 //! Deviations are measured at every sample of every triangle. Over the patches that a triangle holds whole the bilinear surface is farthest from
 //! it at a sample; those that its diagonal base cuts bulge by a quarter of their twist, which is added. Legs are bases of smaller triangles.
 
-use super::diamond::{Base, Diamond, Point};
+use super::diamond::{Base, Diamond, Point, STEPS};
+use super::factors::{Factors, Slopes};
+use super::scan::{Item, Lens, Priority};
 use crate::field::{HeightField, Land};
+use crate::lod::ScreenMetric;
 use crate::space::{Cell, Datum};
 use rayon::prelude::*;
 
@@ -63,7 +66,7 @@ pub(super) enum Cover {
     Void,
 }
 
-/// Nested bounds of every diamond over land: eight bytes a sample.
+/// Nested bounds of every diamond over land: eight bytes a sample, and the heights' own four.
 #[derive(Clone, Debug)]
 pub struct NestedBounds {
     datum: Datum,
@@ -75,17 +78,77 @@ pub struct NestedBounds {
     side: usize,
     /// Heights (m), row by row; NaN where void.
     heights: Vec<f32>,
+    voids: bool,
     levels: Vec<Level>,
+    /// As `levels`, if asked for.
+    slopes: Vec<Level<Slopes>>,
 }
 
 /// The diamonds of the cells of one level and of their sides.
-#[derive(Clone, Debug, Default)]
-struct Level {
-    squares: Vec<Bound>,
-    /// Sides that run east: cells a side × (cells a side + 1).
-    east: Vec<Bound>,
+#[derive(Clone, Debug)]
+struct Level<T = Bound> {
+    squares: Vec<T>,
+    /// Sides that run east: cells a side × (cells a side + 1), in tiles as the others.
+    east: Vec<T>,
     /// Sides that run north: (cells a side + 1) × cells a side.
-    north: Vec<Bound>,
+    north: Vec<T>,
+}
+
+impl<T> Default for Level<T> {
+    fn default() -> Level<T> {
+        Level { squares: Vec::new(), east: Vec::new(), north: Vec::new() }
+    }
+}
+
+impl<T: Copy + Send + Sync> Level<T> {
+    /// Something of each side of the level's cells, asked for by its middle in halves of a cell.
+    fn sides(level: u8, empty: T, of: &(dyn Fn(u32, u32) -> T + Sync)) -> Level<T> {
+        let n = 1u32 << level;
+        Level {
+            squares: Vec::new(),
+            east: tiled([n, n + 1], empty, &|[i, j]| of(2 * i + 1, 2 * j)),
+            north: tiled([n + 1, n], empty, &|[i, j]| of(2 * i, 2 * j + 1)),
+        }
+    }
+
+    /// The same of each cell.
+    fn squares(level: u8, empty: T, of: &(dyn Fn(u32, u32) -> T + Sync)) -> Vec<T> {
+        tiled([1 << level; 2], empty, &|[i, j]| of(2 * i + 1, 2 * j + 1))
+    }
+}
+
+/// Something of each place of a grid, in parallel. Neighbours in both directions lie together: 4 × 2 in a line of memory, if of eight bytes, and
+/// 32 × 16 in a page.
+fn tiled<T: Copy + Send + Sync>(size: [u32; 2], empty: T, of: &(dyn Fn([u32; 2]) -> T + Sync)) -> Vec<T> {
+    let pages = [size[0].div_ceil(32), size[1].div_ceil(16)];
+    let one = |at: u32| {
+        let (page, tile) = (at >> 9, at >> 3 & 63);
+        let i = (page % pages[0]) << 5 | (tile & 7) << 2 | at & 3;
+        let j = (page / pages[0]) << 4 | (tile >> 3) << 1 | at >> 2 & 1;
+        if i < size[0] && j < size[1] { of([i, j]) } else { empty }
+    };
+    (0..pages[0] * pages[1] * 512).into_par_iter().with_min_len(64).map(one).collect()
+}
+
+/// Where the place (i, j) of a grid of so many columns is kept.
+#[inline]
+fn tile(i: u32, j: u32, columns: u32) -> usize {
+    let page = (j >> 4) * columns.div_ceil(32) + (i >> 5);
+    (page << 9 | (j >> 1 & 7) << 6 | (i >> 2 & 7) << 3 | (j & 1) << 2 | i & 3) as usize
+}
+
+impl<T> Level<T> {
+    /// What is kept of a diamond of cells of this level.
+    #[inline]
+    fn slot(&self, diamond: Diamond, level: u8) -> &T {
+        let n = 1u32 << level;
+        let [i, j] = [0, 1].map(|i| diamond.at[i] >> (Cell::MAX_LEVEL - level));
+        match diamond.base {
+            Base::Rising | Base::Falling => &self.squares[tile(i, j, n)],
+            Base::East => &self.east[tile(i, j, n)],
+            Base::North => &self.north[tile(i, j, n + 1)],
+        }
+    }
 }
 
 /// The land has more samples than a flight can name.
@@ -130,35 +193,28 @@ impl NestedBounds {
         let (low, high) = if range.is_empty() { (0.0, 0.0) } else { (range.low, range.high) };
         let step = (high / 65_000.0 - low / 65_000.0).max(low.abs().max(high.abs()) * 1e-6).max(1e-30);
         let base = low - 2.0 * step;
+        let voids = heights.iter().any(|height| height.is_nan());
         let levels = vec![Level::default(); usize::from(finest) + 1];
-        let mut bounds = NestedBounds { datum: land.datum(), finest, base, step, side, heights, levels };
-        for level in (0..=finest).rev() {
-            if level < finest {
-                let n = 1usize << level;
-                let all = |columns: usize, rows: usize, of: &(dyn Fn(usize, usize) -> Bound + Sync)| {
-                    let mut all = vec![Bound::EMPTY; columns * rows];
-                    all.par_chunks_mut(columns).enumerate().for_each(|(row, line)| {
-                        line.iter_mut().enumerate().for_each(|(column, bound)| *bound = of(column, row));
-                    });
-                    all
-                };
-                let half = Diamond::ROOT.half >> level;
-                let at = |i: usize, j: usize| [i as u32 * half, j as u32 * half];
-                let east = all(n, n + 1, &|i, j| bounds.measure(land, Diamond::at(at(2 * i + 1, 2 * j))));
-                let north = all(n + 1, n, &|i, j| bounds.measure(land, Diamond::at(at(2 * i, 2 * j + 1))));
-                bounds.levels[usize::from(level)].east = east;
-                bounds.levels[usize::from(level)].north = north;
-                let squares = all(n, n, &|i, j| bounds.measure(land, Diamond::at(at(2 * i + 1, 2 * j + 1))));
-                bounds.levels[usize::from(level)].squares = squares;
-            }
+        let mut bounds =
+            NestedBounds { datum: land.datum(), finest, base, step, side, heights, voids, levels, slopes: Vec::new() };
+        for level in (0..finest).rev() {
+            let half = Diamond::ROOT.half >> level;
+            let of = |bounds: &NestedBounds, i, j| bounds.measure(land, Diamond::at([i * half, j * half]));
+            let sides = Level::sides(level, Bound::EMPTY, &|i, j| of(&bounds, i, j));
+            bounds.levels[usize::from(level)] = sides;
+            let squares = Level::squares(level, Bound::EMPTY, &|i, j| of(&bounds, i, j));
+            bounds.levels[usize::from(level)].squares = squares;
         }
         Ok(bounds)
     }
 
     /// Bytes of memory held, heights included.
     pub fn bytes(&self) -> usize {
-        let count = |level: &Level| level.squares.len() + level.east.len() + level.north.len();
-        self.heights.len() * size_of::<f32>() + self.levels.iter().map(count).sum::<usize>() * size_of::<Bound>()
+        fn bytes<T>(levels: &[Level<T>]) -> usize {
+            let count = |level: &Level<T>| level.squares.len() + level.east.len() + level.north.len();
+            levels.iter().map(count).sum::<usize>() * size_of::<T>()
+        }
+        self.heights.len() * size_of::<f32>() + bytes(&self.levels) + bytes(&self.slopes)
     }
 
     /// What the heights are counted from.
@@ -169,6 +225,11 @@ impl NestedBounds {
     /// The level of the samples.
     pub fn finest(&self) -> u8 {
         self.finest
+    }
+
+    /// Whether any of it is void.
+    pub(super) fn voids(&self) -> bool {
+        self.voids
     }
 
     /// Height (m) of a lattice point that is a sample; NaN where void.
@@ -187,14 +248,131 @@ impl NestedBounds {
     #[inline]
     fn slot(&self, diamond: Diamond) -> &Bound {
         let level = diamond.cell_level();
-        let of = &self.levels[usize::from(level)];
-        let n = 1usize << level;
-        let [i, j] = diamond.at.map(|c| (c >> (Cell::MAX_LEVEL - level)) as usize);
-        match diamond.base {
-            Base::Rising | Base::Falling => &of.squares[j * n + i],
-            Base::East => &of.east[j * n + i],
-            Base::North => &of.north[j * (n + 1) + i],
+        self.levels[usize::from(level)].slot(diamond, level)
+    }
+
+    /// Keeps slopes, too, which some [`Factors`] ask for: four bytes a sample.
+    pub fn with_slopes(mut self) -> NestedBounds {
+        self.slopes = vec![Level::default(); usize::from(self.finest)];
+        for level in (0..self.finest).rev() {
+            let half = Diamond::ROOT.half >> level;
+            let of = |bounds: &NestedBounds, i, j| {
+                let children = Diamond::at([i * half, j * half]).children().into_iter().flatten();
+                children.fold(Slopes::EMPTY, |all, child| all.union(bounds.slopes(child)))
+            };
+            let sides = Level::sides(level, Slopes::EMPTY, &|i, j| of(&self, i, j));
+            self.slopes[usize::from(level)] = sides;
+            let squares = Level::squares(level, Slopes::EMPTY, &|i, j| of(&self, i, j));
+            self.slopes[usize::from(level)].squares = squares;
         }
+        self
+    }
+
+    /// The slopes of all that needs a diamond; none if they were not asked for.
+    #[inline]
+    pub(super) fn slopes(&self, diamond: Diamond) -> Slopes {
+        if self.slopes.is_empty() {
+            return Slopes::EMPTY;
+        }
+        let level = diamond.cell_level();
+        if level < self.finest {
+            return *self.slopes[usize::from(level)].slot(diamond, level);
+        }
+        let Datum::Plane { size, .. } = self.datum else { return Slopes::EMPTY };
+        let [x, y] = diamond.at.map(|c| (c >> (Cell::MAX_LEVEL - self.finest)) as usize);
+        let corners = if level == self.finest && diamond.is_square() { self.corners(x, y) } else { None };
+        let Some([a, b, c, d]) = corners else { return Slopes::EMPTY };
+        let [dx, dy] = (size / f64::from(1u32 << self.finest)).as_vec2().to_array();
+        Slopes::of([(b - a) / dx, (d - c) / dx], [(c - a) / dy, (d - b) / dy])
+    }
+
+    /// Bits of lattice coordinates below a step: half a sample.
+    #[inline]
+    pub(super) fn shift(&self) -> u8 {
+        Cell::MAX_LEVEL - self.finest - 1
+    }
+
+    /// The lattice point of one in steps, x in the lower half.
+    #[inline]
+    pub(super) fn point(&self, at: u32) -> Point {
+        [(at & 0xffff) << self.shift(), (at >> 16) << self.shift()]
+    }
+
+    /// How many triangles the split of a diamond adds; its middle in steps.
+    #[inline]
+    pub(super) fn cost(&self, at: u32) -> usize {
+        let (x, y, end) = (at & 0xffff, at >> 16, 2 << self.finest);
+        if x == 0 || y == 0 || x == end || y == end { 1 } else { 2 }
+    }
+
+    /// What the priority of a diamond is computed from.
+    #[inline]
+    pub(super) fn item_of(&self, bound: Bound, diamond: Diamond, kind: u8, record: u32) -> Item {
+        let shift = self.shift();
+        Item {
+            at: diamond.at[0] >> shift | diamond.at[1] >> shift << 16,
+            heights: u32::from(bound.low) | u32::from(bound.high) << 16,
+            deviation: bound.deviation(),
+            word: Item::word(kind, diamond.is_square(), diamond.half >> shift, record),
+        }
+    }
+
+    /// The same, its bound looked up.
+    #[inline]
+    pub(super) fn item(&self, diamond: Diamond, kind: u8, record: u32) -> Item {
+        self.item_of(self.bound(diamond), diamond, kind, record)
+    }
+
+    /// The children that a diamond, its middle in steps, is the first parent of.
+    #[inline]
+    pub(super) fn first_children(&self, at: u32, mut each: impl FnMut(Diamond)) {
+        let diamond = Diamond::at(self.point(at));
+        let ([x, y], h) = (diamond.at, diamond.half);
+        if diamond.is_square() {
+            let mut side = |at: Point, base: Base| each(Diamond { at, half: h, base });
+            side([x, y - h], Base::East);
+            side([x + h, y], Base::North);
+            if y + h == STEPS {
+                side([x, y + h], Base::East);
+            }
+            if x == h {
+                side([x - h, y], Base::North);
+            }
+        } else if x > 0 {
+            let q = h / 2;
+            if y > 0 {
+                each(Diamond { at: [x - q, y - q], half: q, base: Base::Falling });
+            }
+            if y < STEPS {
+                each(Diamond { at: [x - q, y + q], half: q, base: Base::Rising });
+            }
+        }
+    }
+
+    /// Whether there is surface under all of a triangle: the middle of its base and its apex, in steps.
+    pub(super) fn whole(&self, middle: Point, apex: Point) -> bool {
+        let [middle, apex] = [middle, apex].map(|at| at.map(|c| c << self.shift()));
+        let diamond = Diamond::at(middle);
+        self.bound(diamond).whole(usize::from(diamond.apexes()[0] != Some(apex)))
+    }
+
+    /// The lens of a view of this land.
+    pub(super) fn lens(&self, metric: &ScreenMetric, priority: Priority, factors: &Factors) -> Lens {
+        let steps = f64::from(STEPS >> self.shift());
+        Lens::new(metric, self.datum, steps, (self.base, self.step), priority, self.voids, factors)
+    }
+
+    /// Begins to load the bounds of those that a diamond is the first parent of.
+    #[inline]
+    pub(super) fn expect_first(&self, at: u32) {
+        self.first_children(at, |child| {
+            if child.cell_level() < self.finest {
+                prefetch(self.slot(child));
+            } else {
+                let [x, y] = self.sample(child.at);
+                prefetch(&self.heights[y * self.side + x]);
+            }
+        });
     }
 
     /// Begins to load what a split of the diamond will ask for.
@@ -333,7 +511,7 @@ impl NestedBounds {
 
 /// Begins to load a line of memory.
 #[inline]
-fn prefetch<T>(what: &T) {
+pub(super) fn prefetch<T>(what: &T) {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a hint; it reads nothing that the program can see.
     unsafe {

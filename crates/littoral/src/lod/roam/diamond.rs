@@ -57,10 +57,11 @@ impl Diamond {
     pub const ROOT: Diamond = Diamond { at: [STEPS / 2; 2], half: STEPS / 2, base: Base::Rising };
 
     /// The diamond whose base has its middle at a point that is no corner of the face.
+    #[inline]
     pub fn at(at: Point) -> Diamond {
         let zeros = (at[0] | at[1]).trailing_zeros();
         let half = 1 << zeros;
-        let [x, y] = at.map(|c| c >> zeros);
+        let [x, y] = [at[0] >> zeros, at[1] >> zeros];
         let base = match (x & 1 == 1, y & 1 == 1) {
             (true, true) if ((x >> 1) + (y >> 1)) & 1 == 0 => Base::Rising,
             (true, true) => Base::Falling,
@@ -71,31 +72,37 @@ impl Diamond {
     }
 
     /// Whether the base is a cell's diagonal.
+    #[inline]
     pub fn is_square(self) -> bool {
         matches!(self.base, Base::Rising | Base::Falling)
     }
 
     /// Level of the cell whose diagonal or side the base is.
+    #[inline]
     pub fn cell_level(self) -> u8 {
         Cell::MAX_LEVEL - 1 - self.half.trailing_zeros() as u8
     }
 
     /// Depth in the bintree, 0 for the whole face: parents have a smaller one.
+    #[inline]
     pub fn level(self) -> u8 {
         2 * self.cell_level() + u8::from(!self.is_square())
     }
 
     /// A number that no other diamond has.
+    #[inline]
     pub fn name(self) -> u64 {
         u64::from(self.at[0]) << 32 | u64::from(self.at[1])
     }
 
+    #[inline]
     fn shifted(self, by: [i32; 2]) -> Option<Point> {
-        let [x, y] = [0, 1].map(|i| self.at[i].wrapping_add_signed(by[i]));
+        let [x, y] = [self.at[0].wrapping_add_signed(by[0]), self.at[1].wrapping_add_signed(by[1])];
         (x <= STEPS && y <= STEPS).then_some([x, y])
     }
 
     /// The ends of the base.
+    #[inline]
     pub fn ends(self) -> [Point; 2] {
         let h = self.half;
         let [x, y] = self.at;
@@ -108,6 +115,7 @@ impl Diamond {
     }
 
     /// The apexes of its two triangles; the second is missing at the face's border. Except for the whole face they are its parents.
+    #[inline]
     pub fn apexes(self) -> [Option<Point>; 2] {
         let h = self.half as i32;
         let both = match self.base {
@@ -116,18 +124,20 @@ impl Diamond {
             Base::East => [[0, h], [0, -h]],
             Base::North => [[-h, 0], [h, 0]],
         };
-        match both.map(|by| self.shifted(by)) {
+        match [self.shifted(both[0]), self.shifted(both[1])] {
             [None, second] => [second, None],
             both => both,
         }
     }
 
     /// The diamonds that must be split before this one.
+    #[inline]
     pub fn parents(self) -> [Option<Diamond>; 2] {
         if self == Diamond::ROOT { [None; 2] } else { self.apexes().map(|apex| apex.map(Diamond::at)) }
     }
 
     /// The diamonds that this one is a parent of.
+    #[inline]
     pub fn children(self) -> [Option<Diamond>; 4] {
         let h = self.half as i32;
         let by = if self.is_square() {
@@ -139,7 +149,8 @@ impl Diamond {
         if !self.is_square() && self.half == 1 {
             return [None; 4];
         }
-        by.map(|by| self.shifted(by).map(Diamond::at))
+        let child = |by: [i32; 2]| self.shifted(by).map(Diamond::at);
+        [child(by[0]), child(by[1]), child(by[2]), child(by[3])]
     }
 
     /// The cell whose diagonal the base is, or that lies on the side of `apex`.

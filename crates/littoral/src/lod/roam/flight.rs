@@ -9,28 +9,33 @@
 //! The mesh is kept, not made: a split turns two triangles into four and a merge four into two, in their places in one dense array, and
 //! what changed is told in ranges, so that a GPU need not be sent the rest.
 //!
-//! Records link to parents and children only, a cache line each: the neighbours of a cell are children of its parents, so that what has to be found is one step away.
+//! Records link to parents and children only, a cache line each: the neighbours of a cell are children of its parents, so that what has to be found is one step
+//! away. Where time went was waiting for memory; so what a frame will change is loaded before its turn (`foresight`).
 //!
 //! Works this rests on: M. Duchaineau et al., "ROAMing terrain: real-time optimally adapting meshes", 1997; P. Lindstrom and V. Pascucci,
 //! "Terrain simplification simplified", 2002 (nesting).
 
+use super::CORNERS;
 use super::bounds::{Bound, NestedBounds};
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
-use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
+use super::factors::Factors;
+use super::scan::{Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
+use super::scratch::Search;
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
-use crate::space::{Cell, Place, View};
+use crate::space::{Place, View};
 use glam::DVec2;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::ops::Range;
 
+mod drawn;
+mod foresight;
+mod queues;
 #[cfg(test)]
 mod tests;
 
-const NONE: u32 = u32::MAX;
+use drawn::Changes;
+use queues::{Key, Queue};
 
-/// How far beyond the last frame's border priorities enter the queues at first.
-const BAND: f32 = 1.004;
+const NONE: u32 = u32::MAX;
 
 /// A diamond of which there is a triangle, or that is split: a cache line.
 #[derive(Clone, Copy, Debug)]
@@ -56,26 +61,6 @@ struct Record {
     kids: u8,
 }
 
-/// Order of splitting: by priority, then coarser ones first, then by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Key {
-    /// Bits of a number that is not negative: they sort like it.
-    priority: u32,
-    level: Reverse<u8>,
-    name: u64,
-    record: u32,
-}
-
-impl Key {
-    fn at(&self) -> Point {
-        [(self.name >> 32) as u32, self.name as u32]
-    }
-
-    fn number(&self) -> f32 {
-        f32::from_bits(self.priority)
-    }
-}
-
 /// ROAM over prepared land, from view to view.
 #[derive(Clone, Debug)]
 pub struct RoamFlight<'a> {
@@ -84,6 +69,8 @@ pub struct RoamFlight<'a> {
     pub limits: Limits,
     /// What comes first.
     pub priority: Priority,
+    /// What makes triangles matter more or less.
+    pub factors: Factors,
     /// Priorities are measured anew for one in so many groups a frame, round robin (1: all). With more, what is reached is told from priorities up to so many
     /// frames old.
     pub groups: u32,
@@ -92,8 +79,8 @@ pub struct RoamFlight<'a> {
     unused: Vec<u32>,
     list: List,
     /// What may be split, above `low`; what may be merged, up to `high`.
-    splits: BinaryHeap<Key>,
-    merges: BinaryHeap<Reverse<Key>>,
+    splits: Queue,
+    merges: Queue,
     band: (f32, f32),
     tolerance: f32,
     border: f32,
@@ -106,55 +93,12 @@ pub struct RoamFlight<'a> {
     freed: Vec<u32>,
     changed: Changes,
     found: Vec<u32>,
+    search: Search,
     /// Became splittable in the last step.
     ready: Vec<u32>,
     /// Splits and merges since it was made.
     operations: (u64, u64),
 }
-
-/// Which parts of a mesh changed, in blocks.
-#[derive(Clone, Debug, Default)]
-pub struct Changes {
-    triangles: Vec<u64>,
-    vertices: Vec<u64>,
-}
-
-/// Triangles or vertices a block.
-const BLOCK: usize = 64;
-
-impl Changes {
-    #[inline]
-    fn mark(blocks: &mut Vec<u64>, at: u32) {
-        let block = at as usize / BLOCK;
-        if block / 64 >= blocks.len() {
-            blocks.resize(block / 64 + 1, 0);
-        }
-        blocks[block / 64] |= 1 << (block % 64);
-    }
-
-    fn clear(&mut self) {
-        self.triangles.fill(0);
-        self.vertices.fill(0);
-    }
-
-    fn ranges(blocks: &[u64], len: usize) -> impl Iterator<Item = Range<usize>> + '_ {
-        let marked = move |block: usize| blocks.get(block / 64).is_some_and(|word| word >> (block % 64) & 1 == 1);
-        let mut block = 0;
-        std::iter::from_fn(move || {
-            while block * BLOCK < len && !marked(block) {
-                block += 1;
-            }
-            let from = block;
-            while block * BLOCK < len && marked(block) {
-                block += 1;
-            }
-            (from < block).then(|| from * BLOCK..(block * BLOCK).min(len))
-        })
-    }
-}
-
-/// Corners of the face, the first four vertices: south-west, south-east, north-east, north-west.
-const CORNERS: [Point; 4] = [[0, 0], [STEPS, 0], [STEPS, STEPS], [0, STEPS]];
 
 impl<'a> RoamFlight<'a> {
     /// A flight over prepared land, with nothing drawn yet.
@@ -163,13 +107,14 @@ impl<'a> RoamFlight<'a> {
             bounds,
             limits,
             priority: Priority::default(),
+            factors: Factors::default(),
             groups: 1,
             turn: 0,
             records: Vec::new(),
             unused: Vec::new(),
             list: List::default(),
-            splits: BinaryHeap::new(),
-            merges: BinaryHeap::new(),
+            splits: Queue::default(),
+            merges: Queue::default(),
             band: (0.0, 0.0),
             tolerance: 0.0,
             border: 0.0,
@@ -181,6 +126,7 @@ impl<'a> RoamFlight<'a> {
             freed: Vec::new(),
             changed: Changes::default(),
             found: Vec::new(),
+            search: Search::default(),
             ready: Vec::new(),
             operations: (0, 0),
         }
@@ -250,13 +196,8 @@ impl<'a> RoamFlight<'a> {
     /// If the view is not one that a picture can be drawn of.
     pub fn update(&mut self, view: &View, stop: &mut dyn FnMut() -> bool) -> Result<Reached, ViewError> {
         let metric = ScreenMetric::new(view, self.bounds.datum())?;
-        let steps = f64::from(STEPS >> self.shift());
-        let heights = (self.bounds.base, self.bounds.step);
-        self.lens = Some(Lens::new(&metric, self.bounds.datum(), steps, heights, self.priority));
-        self.tolerance = match self.priority {
-            Priority::ScreenError => metric.tolerance(),
-            Priority::InverseDistance => 0.0,
-        };
+        self.lens = Some(self.bounds.lens(&metric, self.priority, &self.factors));
+        self.tolerance = self.priority.tolerance(&metric);
         self.changed.clear();
         self.splits.clear();
         self.merges.clear();
@@ -273,14 +214,10 @@ impl<'a> RoamFlight<'a> {
         }
         let stopped = self.balance(stop);
         self.compact();
-        let (worst, void) = self.list.worst(self.tolerance);
-        let pixels = if void && self.priority == Priority::ScreenError { f32::INFINITY } else { worst };
+        let worst = self.list.worst();
+        let void = self.priority == Priority::ScreenError && self.bounds.voids() && self.list.any_void(self.tolerance);
+        let pixels = if void { f32::INFINITY } else { worst };
         Ok(Reached { pixels, limited: worst > self.tolerance || stopped })
-    }
-
-    /// Bits of lattice coordinates below half a sample.
-    fn shift(&self) -> u8 {
-        Cell::MAX_LEVEL - self.bounds.finest() - 1
     }
 
     /// The two triangles of the face.
@@ -304,9 +241,14 @@ impl<'a> RoamFlight<'a> {
         Vertex { x: at[0], y: at[1], face: 0, height: self.bounds.height(at) }
     }
 
+    /// The level of cells that are not split any more.
+    fn finest(&self) -> u8 {
+        self.limits.finest.min(self.bounds.finest()).min(FINEST)
+    }
+
     /// The list that an unsplit diamond belongs to when it has both triangles.
     fn idle(&self, diamond: Diamond) -> u8 {
-        if diamond.cell_level() < self.limits.finest.min(self.bounds.finest()).min(FINEST) { SPLIT } else { STUCK }
+        if diamond.cell_level() < self.finest() { SPLIT } else { STUCK }
     }
 
     fn record(&mut self, diamond: Diamond, ends: [u32; 2]) -> u32 {
@@ -331,23 +273,14 @@ impl<'a> RoamFlight<'a> {
         self.records.len() as u32 - 1
     }
 
-    fn item(&self, bound: Bound, diamond: Diamond, kind: u8, record: u32) -> Item {
-        let shift = self.shift();
-        Item {
-            at: diamond.at[0] >> shift | diamond.at[1] >> shift << 16,
-            heights: u32::from(bound.low) | u32::from(bound.high) << 16,
-            deviation: bound.deviation(),
-            word: Item::word(kind, diamond.is_square(), diamond.half >> shift, record),
-        }
-    }
-
     /// Puts a record in the list, and in its queue if it is within the band.
     fn join(&mut self, record: u32, kind: u8) {
         let known = &self.records[record as usize];
         let diamond = Diamond::at(known.at);
-        let item = self.item(known.bound, diamond, kind, record);
-        let priority = self.lens.as_ref().map_or(0.0, |lens| lens.priority(&item));
-        let place = self.list.add(item, priority);
+        let item = self.bounds.item_of(known.bound, diamond, kind, record);
+        let slopes = self.bounds.slopes(diamond);
+        let priority = self.lens.as_ref().map_or(0.0, |lens| lens.priority(&item, slopes));
+        let place = self.list.add(item, slopes, priority);
         let known = &mut self.records[record as usize];
         (known.place, known.list) = (place, kind);
         self.enqueue(record, diamond, kind, priority);
@@ -358,7 +291,7 @@ impl<'a> RoamFlight<'a> {
         let known = &mut self.records[record as usize];
         known.list = kind;
         self.list.turn(known.place, kind);
-        let priority = self.list.priority[known.place as usize];
+        let priority = self.list.priority(known.place);
         self.enqueue(record, diamond, kind, priority);
     }
 
@@ -366,11 +299,15 @@ impl<'a> RoamFlight<'a> {
         match kind {
             SPLIT if priority > self.tolerance => {
                 if priority > self.band.0 {
-                    self.splits.push(key(priority, diamond, record));
+                    self.foresee_child(record);
+                    self.splits.push(Key::new(priority, diamond, record));
                 }
                 self.ready.push(record);
             }
-            MERGE if priority <= self.band.1 => self.merges.push(Reverse(key(priority, diamond, record))),
+            MERGE if priority <= self.band.1 => {
+                self.foresee_merge(record, 1);
+                self.merges.push(Key::new(priority, diamond, record).reversed());
+            }
             _ => {}
         }
     }
@@ -381,53 +318,6 @@ impl<'a> RoamFlight<'a> {
         self.list.remove(known.place);
     }
 
-    /// Draws the triangle of a diamond on the side of one of its parents, whose vertex is `apex`.
-    fn draw(&mut self, record: u32, diamond: Diamond, side: usize, apex: u32) {
-        let known = self.records[record as usize];
-        if !known.bound.whole(side) {
-            return;
-        }
-        let [a, b] = known.ends;
-        // Clockwise by the order of the base's ends?
-        let towards = diamond.apexes()[side].expect("a triangle on this side");
-        let turned = match diamond.base {
-            Base::Rising | Base::North => towards[0] > diamond.at[0],
-            Base::Falling => towards[0] < diamond.at[0],
-            Base::East => towards[1] < diamond.at[1],
-        };
-        let triangle = if turned { [b, a, apex] } else { [a, b, apex] };
-        let owner = 2 * record + side as u32;
-        let slot = match self.freed.pop() {
-            Some(slot) => {
-                self.mesh.triangles[slot as usize] = triangle;
-                self.owners[slot as usize] = owner;
-                slot
-            }
-            None => {
-                self.mesh.triangles.push(triangle);
-                self.owners.push(owner);
-                self.owners.len() as u32 - 1
-            }
-        };
-        Changes::mark(&mut self.changed.triangles, slot);
-        self.records[record as usize].triangles[side] = slot;
-    }
-
-    /// Closes the gaps that merges left among the triangles.
-    fn compact(&mut self) {
-        self.freed.sort_unstable();
-        while let Some(slot) = self.freed.pop() {
-            let owner = self.owners.pop().expect("as many owners as triangles");
-            let triangle = self.mesh.triangles.pop().expect("freed triangles are there");
-            if (slot as usize) < self.owners.len() {
-                self.owners[slot as usize] = owner;
-                self.mesh.triangles[slot as usize] = triangle;
-                self.records[owner as usize / 2].triangles[owner as usize & 1] = slot;
-                Changes::mark(&mut self.changed.triangles, slot);
-            }
-        }
-    }
-
     /// Vertices at the apexes.
     fn apexes(&self, known: &Record, diamond: Diamond) -> [u32; 2] {
         if diamond == Diamond::ROOT {
@@ -436,9 +326,9 @@ impl<'a> RoamFlight<'a> {
         known.parents.map(|parent| if parent == NONE { NONE } else { self.records[parent as usize].triangles[0] })
     }
 
-    /// The record of a split diamond's child, if the child's other parent has made it.
-    fn met(&self, known: &Record, diamond: Diamond, child: usize) -> Option<u32> {
-        // Through a parent to the child's other parent, and how the child lies to that.
+    /// Through a parent to a child's other parent, and how the child lies to that.
+    #[inline]
+    fn beyond(&self, known: &Record, diamond: Diamond, child: usize) -> (u32, usize) {
         let (parent, other, back) = if diamond.is_square() {
             let (slot, own) = match (diamond.base, child) {
                 (Base::Rising, 0 | 1) => (0, 3),
@@ -455,10 +345,12 @@ impl<'a> RoamFlight<'a> {
             let slot = usize::from(known.parents[1] != NONE && !first);
             (known.parents[slot], other, [2, 3, 0, 1][child])
         };
-        if parent == NONE {
-            return None;
-        }
-        let other = self.records[parent as usize].children[other];
+        (self.records.get(parent as usize).map_or(NONE, |parent| parent.children[other]), back)
+    }
+
+    /// The record of a split diamond's child, if the child's other parent has made it.
+    fn met(&self, known: &Record, diamond: Diamond, child: usize) -> Option<u32> {
+        let (other, back) = self.beyond(known, diamond, child);
         let other = self.records.get(other as usize).filter(|other| other.split)?;
         Some(other.children[back]).filter(|&child| child != NONE)
     }
@@ -493,27 +385,24 @@ impl<'a> RoamFlight<'a> {
             }
         }
         let apexes = self.apexes(&known, diamond);
-        let (points, ends) = (diamond.apexes(), diamond.ends());
         for (i, child) in diamond.children().into_iter().enumerate() {
             let Some(child) = child else { continue };
-            let found = self.met(&known, diamond, i);
-            let of = found.unwrap_or_else(|| {
-                let vertex = |end: Point| match end {
-                    _ if end == ends[0] => known.ends[0],
-                    _ if end == ends[1] => known.ends[1],
-                    _ if Some(end) == points[0] => apexes[0],
-                    _ => apexes[1],
-                };
-                let ends = child.ends().map(vertex);
-                self.record(child, ends)
-            });
-            let side = usize::from(child.apexes()[0] != Some(diamond.at));
+            let ends = child_ends(diamond, known.ends, apexes, i);
+            let of = match self.met(&known, diamond, i) {
+                Some(of) => of,
+                None => self.record(child, ends),
+            };
+            let border = at_border(child);
+            let side = if border { 0 } else { side_of_parent(diamond, i) };
             self.records[record as usize].children[i] = of;
             let held = &mut self.records[of as usize];
             held.parents[side] = record;
             held.held += 1;
-            let complete = held.held == if at_border(child) { 1 } else { 2 };
-            self.draw(of, child, side, slot);
+            let complete = held.held == if border { 1 } else { 2 };
+            if held.bound.whole(side) {
+                let [a, b] = ends;
+                self.put(of, side, if i < 2 { [a, b, slot] } else { [b, a, slot] });
+            }
             if complete {
                 let list = self.idle(child);
                 self.join(of, list);
@@ -568,137 +457,37 @@ impl<'a> RoamFlight<'a> {
             }
         }
     }
+}
 
-    /// From scratch: splits by thresholds that fall towards where the budget ends, without a queue.
-    fn descend(&mut self) {
-        let budget = self.limits.triangles;
-        let mut above = f32::INFINITY;
-        loop {
-            self.ready.clear();
-            self.list.within(SPLIT, 0.0, f32::INFINITY, &mut self.found);
-            let worst = self.found.iter().map(|&place| self.list.priority[place as usize]).fold(0.0, f32::max);
-            if worst <= self.tolerance || self.triangles >= budget {
-                break;
-            }
-            // Triangles are about as many as the inverse of the bound; rather too few steps than one too far.
-            let share = self.triangles as f32 / budget as f32;
-            above = (above.min(worst) * (1.1 * share).clamp(0.3, 0.97)).max(self.tolerance);
-            self.list.within(SPLIT, above, f32::INFINITY, &mut self.found);
-            self.ready.extend(self.found.iter().map(|&place| self.list.record(place)));
-            while let Some(record) = self.ready.pop() {
-                let known = &self.records[record as usize];
-                if known.list == SPLIT && self.list.priority[known.place as usize] > above {
-                    self.split(record);
-                }
-                if self.triangles >= budget {
-                    break;
-                }
-            }
-        }
-        self.border = above;
-    }
+/// Which parent of its child a diamond is, but at the border of the face.
+#[inline]
+fn side_of_parent(diamond: Diamond, child: usize) -> usize {
+    usize::from(if diamond.is_square() { child >= 2 } else { child == 1 || child == 2 })
+}
 
-    /// Whether a key is still true.
-    fn valid(&self, key: &Key, list: u8) -> bool {
-        let known = &self.records[key.record as usize];
-        known.list == list && known.at == key.at() && self.list.priority[known.place as usize].to_bits() == key.priority
-    }
-
-    /// Makes the band wider and takes what it holds into the queues.
-    fn widen(&mut self, low: f32, high: f32) {
-        let (low, high) = (low.min(self.band.0), high.max(self.band.1));
-        let key_of = |list: &List, records: &[Record], place: u32| {
-            let record = list.record(place);
-            key(list.priority[place as usize], Diamond::at(records[record as usize].at), record)
-        };
-        if low < self.band.0 {
-            self.list.within(SPLIT, low.max(self.tolerance), self.band.0, &mut self.found);
-            for &place in &self.found {
-                let key = key_of(&self.list, &self.records, place);
-                if key.number() > self.border {
-                    self.bounds.expect(Diamond::at(key.at()));
-                }
-                self.splits.push(key);
-            }
-        }
-        if high > self.band.1 {
-            self.list.within(MERGE, self.band.1, high, &mut self.found);
-            self.merges.extend(self.found.iter().map(|&place| Reverse(key_of(&self.list, &self.records, place))));
-        }
-        self.band = (low, high);
-    }
-
-    /// Splits and merges until the queues agree; whether it was stopped.
-    fn balance(&mut self, stop: &mut dyn FnMut() -> bool) -> bool {
-        let (budget, tolerance) = (self.limits.triangles.max(2), self.tolerance);
-        let border = self.border.max(tolerance);
-        self.widen((border / BAND).max(tolerance), (border * BAND).max(tolerance));
-        let mut wider = BAND;
-        let mut steps = 0u32;
-        let mut stopped = false;
-        loop {
-            self.ready.clear();
-            steps += 1;
-            if steps.is_multiple_of(16) && stop() {
-                stopped = true;
-                break;
-            }
-            while self.splits.peek().is_some_and(|top| !self.valid(top, SPLIT)) {
-                self.splits.pop();
-            }
-            while self.merges.peek().is_some_and(|last| !self.valid(&last.0, MERGE)) {
-                self.merges.pop();
-            }
-            let (top, last) = (self.splits.peek().copied(), self.merges.peek().map(|last| last.0));
-            let merging = match (top, last) {
-                // Nothing is split that need not be.
-                (_, Some(last)) if last.number() <= tolerance => true,
-                _ if self.triangles > budget => true,
-                (Some(top), _) => {
-                    let known = &self.records[top.record as usize];
-                    if self.triangles + cost(known, Diamond::at(known.at)) <= budget {
-                        self.splits.pop();
-                        self.split(top.record);
-                        continue;
-                    }
-                    match last {
-                        Some(last) if last < top => true,
-                        Some(_) => break,
-                        None if top.number() > self.band.1 => true,
-                        None => break,
-                    }
-                }
-                (None, last) => {
-                    // Is there anything below the band, for which there is room or something lower to be merged?
-                    let full = self.triangles + 1 > budget;
-                    if self.band.0 <= tolerance || full && last.is_none_or(|last| last.number() > self.band.0) {
-                        break;
-                    }
-                    wider *= wider;
-                    let low = if wider.is_finite() { self.band.0 / wider } else { 0.0 };
-                    self.widen(low.max(tolerance), self.band.1);
-                    continue;
-                }
-            };
-            if merging {
-                match last {
-                    Some(last) => {
-                        self.merges.pop();
-                        self.merge(last.record);
-                    }
-                    None if self.band.1 == f32::INFINITY => break,
-                    None => {
-                        wider *= wider;
-                        let high =
-                            if wider.is_finite() { self.band.1.max(f32::MIN_POSITIVE) * wider } else { f32::INFINITY };
-                        self.widen(self.band.0, high);
-                    }
-                }
-            }
-        }
-        let next = self.splits.peek().map(Key::number).or(self.merges.peek().map(|last| last.0.number()));
-        self.border = next.unwrap_or(border).max(tolerance);
-        stopped
+/// The ends of a child's base: one of its parent's ends, and one of its apexes.
+#[inline]
+fn child_ends(diamond: Diamond, ends: [u32; 2], apexes: [u32; 2], child: usize) -> [u32; 2] {
+    let [a, b] = ends;
+    let [p, q] = apexes;
+    match (diamond.base, child) {
+        (Base::Rising, 0) => [a, p],
+        (Base::Rising, 1) => [p, b],
+        (Base::Rising, 2) => [q, b],
+        (Base::Rising, _) => [a, q],
+        (Base::Falling, 0) => [q, b],
+        (Base::Falling, 1) => [b, p],
+        (Base::Falling, 2) => [a, p],
+        (Base::Falling, _) => [q, a],
+        // At the border there is one apex only, whichever side it is on.
+        (Base::East, 0) => [a, if q == NONE { p } else { q }],
+        (Base::East, 1) => [if q == NONE { p } else { q }, b],
+        (Base::East, 2) => [p, b],
+        (Base::East, _) => [a, p],
+        (Base::North, 0) => [p, a],
+        (Base::North, 1) => [a, if q == NONE { p } else { q }],
+        (Base::North, 2) => [b, if q == NONE { p } else { q }],
+        (Base::North, _) => [p, b],
     }
 }
 
@@ -710,8 +499,4 @@ fn cost(record: &Record, diamond: Diamond) -> usize {
 /// Whether a diamond has one triangle only.
 fn at_border(diamond: Diamond) -> bool {
     diamond.at.iter().any(|&c| c == 0 || c == STEPS)
-}
-
-fn key(priority: f32, diamond: Diamond, record: u32) -> Key {
-    Key { priority: priority.to_bits(), level: Reverse(diamond.level()), name: diamond.name(), record }
 }

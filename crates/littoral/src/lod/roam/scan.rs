@@ -6,7 +6,9 @@
 //! under rounding, too: a box within another never gets the larger number, not by a bit.
 
 use super::super::ScreenMetric;
-use crate::space::{Datum, View};
+use super::bounds::prefetch;
+use super::factors::{Factors, Slopes, Weights};
+use crate::space::{Cell, Datum, View};
 use glam::DVec3;
 use multiversion::multiversion;
 
@@ -20,8 +22,18 @@ pub enum Priority {
     InverseDistance,
 }
 
+impl Priority {
+    /// What priority refinement ends at.
+    pub(super) fn tolerance(self, metric: &ScreenMetric) -> f32 {
+        match self {
+            Priority::ScreenError => metric.tolerance(),
+            Priority::InverseDistance => 0.0,
+        }
+    }
+}
+
 /// A view, in the coordinates of the lists.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Lens {
     /// The eye's place, in whole steps, and what is left of it (m).
     eye: [i32; 2],
@@ -37,6 +49,9 @@ pub(super) struct Lens {
     focal: f32,
     stretch: f32,
     priority: Priority,
+    /// Whether anything may be void.
+    voids: bool,
+    weights: Option<Weights>,
 }
 
 impl Lens {
@@ -47,6 +62,8 @@ impl Lens {
         steps: f64,
         heights: (f32, f32),
         priority: Priority,
+        voids: bool,
+        factors: &Factors,
     ) -> Lens {
         let (forward, sides, focal, stretch) = metric.lens();
         let (origin, size) = match datum {
@@ -69,21 +86,33 @@ impl Lens {
             focal,
             stretch,
             priority,
+            voids,
+            weights: Weights::new(factors, eye.truncate()),
         }
     }
 
+    /// The box round all that needs a diamond.
+    pub(super) fn extent(&self, item: &Item) -> Extent {
+        extent(self, item.at, item.heights, item.word)
+    }
+
     /// The priority of one.
-    pub(super) fn priority(&self, item: &Item) -> f32 {
+    pub(super) fn priority(&self, item: &Item, slopes: Slopes) -> f32 {
         let Item { at, heights, deviation, word } = *item;
-        match self.priority {
-            Priority::ScreenError => priority::<true>(self, at, heights, deviation, word),
-            Priority::InverseDistance => priority::<false>(self, at, heights, deviation, word),
+        let number = match self.priority {
+            Priority::ScreenError => priority::<true, true>(self, at, heights, deviation, word),
+            Priority::InverseDistance => priority::<false, true>(self, at, heights, deviation, word),
+        };
+        match &self.weights {
+            Some(weights) if number > 0.0 => number * weights.of(&self.extent(item), slopes),
+            _ => number,
         }
     }
 }
 
 /// What the priority of a diamond is computed from, and who it is: sixteen bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(16))]
 pub(super) struct Item {
     /// Its middle (steps), x in the lower half.
     pub at: u32,
@@ -97,142 +126,188 @@ pub(super) struct Item {
 }
 
 impl Item {
+    /// Level of the cell whose diagonal or side the base is; steps are half a sample.
+    #[inline]
+    pub(super) fn unit_level(&self, shift: u8) -> u8 {
+        Cell::MAX_LEVEL - 1 - shift - (self.word >> 3 & 15) as u8
+    }
+
+    #[inline]
     pub(super) fn word(kind: u8, square: bool, unit: u32, record: u32) -> u32 {
         u32::from(kind) | u32::from(square) << 2 | unit.trailing_zeros() << 3 | record << 7
     }
 }
 
-/// Entries of a list: what may be split, what may be merged, what would be split if that were allowed, and what is not there.
+/// Entries of a list: what may be split, what may be merged, what would be split if that were allowed, and what is not there. What is not split is
+/// even.
 pub(super) const SPLIT: u8 = 0;
 pub(super) const MERGE: u8 = 1;
 pub(super) const STUCK: u8 = 2;
 pub(super) const NOWHERE: u8 = 3;
 
-/// Diamonds in arrays, with their priorities. Places stay; those left are taken again, the last left first, while its memory is near.
+/// Diamonds in a row, with their priorities. Places stay; those left are taken again, the last left first, while its memory is near.
 #[derive(Clone, Debug, Default)]
 pub(super) struct List {
-    at: Vec<u32>,
-    heights: Vec<u32>,
-    deviation: Vec<f32>,
-    word: Vec<u32>,
-    /// Priorities, as last measured; NaN where there is no entry.
-    pub priority: Vec<f32>,
+    items: Vec<Item>,
+    slopes: Vec<Slopes>,
+    /// Priorities, as last measured, with the sign bit set for what may be merged; NaN where there is no entry.
+    numbers: Vec<f32>,
     left: Vec<u32>,
 }
 
 impl List {
     pub(super) fn len(&self) -> usize {
-        self.word.len()
+        self.items.len()
     }
 
     pub(super) fn clear(&mut self) {
-        for numbers in [&mut self.at, &mut self.heights, &mut self.word, &mut self.left] {
-            numbers.clear();
-        }
-        self.deviation.clear();
-        self.priority.clear();
+        self.items.clear();
+        self.slopes.clear();
+        self.left.clear();
+        self.numbers.clear();
     }
 
     /// Adds one; returns where.
-    pub(super) fn add(&mut self, item: Item, priority: f32) -> u32 {
+    pub(super) fn add(&mut self, item: Item, slopes: Slopes, priority: f32) -> u32 {
+        let number = marked(priority, item.word);
         let Some(place) = self.left.pop() else {
-            self.at.push(item.at);
-            self.heights.push(item.heights);
-            self.deviation.push(item.deviation);
-            self.word.push(item.word);
-            self.priority.push(priority);
-            return self.word.len() as u32 - 1;
+            self.items.push(item);
+            self.slopes.push(slopes);
+            self.numbers.push(number);
+            return self.items.len() as u32 - 1;
         };
-        let i = place as usize;
-        self.at[i] = item.at;
-        self.heights[i] = item.heights;
-        self.deviation[i] = item.deviation;
-        self.word[i] = item.word;
-        self.priority[i] = priority;
+        self.items[place as usize] = item;
+        self.slopes[place as usize] = slopes;
+        self.numbers[place as usize] = number;
         place
     }
 
     /// Makes an entry one of another kind.
     pub(super) fn turn(&mut self, place: u32, kind: u8) {
-        let word = &mut self.word[place as usize];
+        let word = &mut self.items[place as usize].word;
         *word = *word & !3 | u32::from(kind);
+        let number = &mut self.numbers[place as usize];
+        *number = marked(number.abs(), *word);
     }
 
     /// Removes one.
     pub(super) fn remove(&mut self, place: u32) {
         let i = place as usize;
         // Nothing that is compared with NaN is true, and what is computed from it stays so.
-        self.deviation[i] = f32::NAN;
-        self.priority[i] = f32::NAN;
-        self.word[i] |= u32::from(NOWHERE);
+        self.items[i].deviation = f32::NAN;
+        self.items[i].word |= u32::from(NOWHERE);
+        self.numbers[i] = f32::NAN;
         self.left.push(place);
+    }
+
+    /// The priority of an entry.
+    #[inline]
+    pub(super) fn priority(&self, place: u32) -> f32 {
+        self.numbers[place as usize].abs()
     }
 
     /// The record of an entry.
     pub(super) fn record(&self, place: u32) -> u32 {
-        self.word[place as usize] >> 7
+        self.items[place as usize].word >> 7
+    }
+
+    /// The middle of an entry's base (steps).
+    pub(super) fn middle(&self, place: u32) -> [u32; 2] {
+        let at = self.items[place as usize].at;
+        [at & 0xffff, at >> 16]
+    }
+
+    /// Begins to load an entry.
+    #[inline]
+    pub(super) fn expect(&self, place: u32) {
+        if let Some(item) = self.items.get(place as usize) {
+            prefetch(item);
+            prefetch(&self.numbers[place as usize]);
+        }
+    }
+
+    /// Begins to load places that entries will soon be added at.
+    #[inline]
+    pub(super) fn expect_room(&self) {
+        for depth in 3..6 {
+            if let Some(&place) = self.left.iter().nth_back(depth) {
+                self.expect(place);
+            }
+        }
     }
 
     /// Records of all places, left ones included.
     #[cfg(test)]
     pub(super) fn word_records(&self) -> impl Iterator<Item = u32> + '_ {
-        self.word.iter().map(|word| word >> 7)
+        self.items.iter().map(|item| item.word >> 7)
     }
 
     /// Measures all whose number lies in `part`.
     pub(super) fn measure(&mut self, lens: &Lens, part: std::ops::Range<usize>) {
-        let arrays = Arrays {
-            at: &self.at[part.clone()],
-            heights: &self.heights[part.clone()],
-            deviation: &self.deviation[part.clone()],
-            word: &self.word[part.clone()],
-        };
-        match lens.priority {
-            Priority::ScreenError => measure_errors(lens, arrays, &mut self.priority[part]),
-            Priority::InverseDistance => measure_distances(lens, arrays, &mut self.priority[part]),
-        }
+        measure(lens, &self.items[part.clone()], &self.slopes[part.clone()], &mut self.numbers[part]);
     }
 
-    /// Greatest priority of what is not split, and whether any above `tolerance` is of something partly void.
-    pub(super) fn worst(&self, tolerance: f32) -> (f32, bool) {
-        worst(&self.priority, &self.deviation, &self.word, tolerance)
+    /// Greatest priority of what is not split.
+    pub(super) fn worst(&self) -> f32 {
+        worst(&self.numbers)
+    }
+
+    /// Whether anything above `tolerance` that is not split is partly void.
+    pub(super) fn any_void(&self, tolerance: f32) -> bool {
+        let void = |(number, item): (&f32, &Item)| *number > tolerance && item.deviation == f32::INFINITY;
+        self.numbers.iter().zip(&self.items).any(void)
     }
 
     /// Puts the places of those of a kind whose priority is above `above` and not above `most` into `found`.
     pub(super) fn within(&self, kind: u8, above: f32, most: f32, found: &mut Vec<u32>) {
         found.clear();
-        within(&self.priority, &self.word, kind, above, most, found);
+        within(&self.numbers, kind == MERGE, above, most, found);
+        if kind == SPLIT {
+            found.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
+        }
     }
 }
 
-#[derive(Clone, Copy)]
-struct Arrays<'a> {
-    at: &'a [u32],
-    heights: &'a [u32],
-    deviation: &'a [f32],
-    word: &'a [u32],
+/// Measures many; the number of one that may be merged has its sign bit set.
+pub(super) fn measure(lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {
+    match lens.priority {
+        Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
+        Priority::ScreenError => measure_errors(lens, items, out),
+        Priority::InverseDistance => measure_distances(lens, items, out),
+    }
+    if let Some(weights) = &lens.weights {
+        weights.weigh(lens, items, slopes, out);
+    }
 }
 
 const LANES: usize = 16;
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn measure_errors(lens: &Lens, arrays: Arrays, out: &mut [f32]) {
-    measure::<true>(lens, arrays, out);
+fn measure_errors(lens: &Lens, items: &[Item], out: &mut [f32]) {
+    measure_one_by_one::<true, false>(lens, items, out);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn measure_distances(lens: &Lens, arrays: Arrays, out: &mut [f32]) {
-    measure::<false>(lens, arrays, out);
+fn measure_errors_and_voids(lens: &Lens, items: &[Item], out: &mut [f32]) {
+    measure_one_by_one::<true, true>(lens, items, out);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn measure_distances(lens: &Lens, items: &[Item], out: &mut [f32]) {
+    measure_one_by_one::<false, false>(lens, items, out);
 }
 
 #[inline(always)]
-fn measure<const ERRORS: bool>(lens: &Lens, a: Arrays, out: &mut [f32]) {
-    let lens = *lens;
-    let n = out.len();
-    let (at, heights, deviation, word) = (&a.at[..n], &a.heights[..n], &a.deviation[..n], &a.word[..n]);
-    for i in 0..n {
-        out[i] = priority::<ERRORS>(&lens, at[i], heights[i], deviation[i], word[i]);
+fn measure_one_by_one<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
+    for (out, &Item { at, heights, deviation, word }) in out.iter_mut().zip(items) {
+        *out = marked(priority::<ERRORS, VOIDS>(lens, at, heights, deviation, word), word);
     }
+}
+
+/// The number kept of a priority that is not negative.
+#[inline(always)]
+fn marked(priority: f32, word: u32) -> f32 {
+    f32::from_bits(priority.to_bits() | word << 31)
 }
 
 #[inline(always)]
@@ -245,41 +320,61 @@ fn most(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The priority of an [`Item`].
+/// A box, from the eye (m): least and greatest eastward, northward and upward.
+pub(super) struct Extent(pub [[f32; 2]; 3]);
+
+/// The box round all that needs a diamond.
 #[inline(always)]
-fn priority<const ERRORS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f32, word: u32) -> f32 {
+fn extent(lens: &Lens, at: u32, heights: u32, word: u32) -> Extent {
     let (x, y) = ((at & 0xffff) as i32, (at >> 16) as i32);
     let half = ((2 + (word >> 2 & 1)) << (word >> 3 & 15)) as i32;
     let (low, high) = ((heights & 0xffff) as i32, (heights >> 16) as i32);
-    let there = low <= high;
     let (low, high) = (lens.base + low as f32 * lens.step, lens.base + high as f32 * lens.step);
-    let x0 = (x - half - lens.eye[0]) as f32 * lens.scale[0] - lens.rest[0];
-    let x1 = (x + half - lens.eye[0]) as f32 * lens.scale[0] - lens.rest[0];
-    let y0 = (y - half - lens.eye[1]) as f32 * lens.scale[1] - lens.rest[1];
-    let y1 = (y + half - lens.eye[1]) as f32 * lens.scale[1] - lens.rest[1];
-    let (z0, z1) = (low - lens.height, high - lens.height);
+    let along = |x: i32, axis: usize| (x - lens.eye[axis]) as f32 * lens.scale[axis] - lens.rest[axis];
+    Extent([
+        [along(x - half, 0), along(x + half, 0)],
+        [along(y - half, 1), along(y + half, 1)],
+        [low - lens.height, high - lens.height],
+    ])
+}
+
+/// The priority of an [`Item`], but for the factors.
+#[inline(always)]
+fn priority<const ERRORS: bool, const VOIDS: bool>(
+    lens: &Lens,
+    at: u32,
+    heights: u32,
+    deviation: f32,
+    word: u32,
+) -> f32 {
+    let there = heights & 0xffff <= heights >> 16;
+    let Extent([[x0, x1], [y0, y1], [z0, z1]]) = extent(lens, at, heights, word);
     let far_x = most(x0.abs(), x1.abs());
     let far_y = most(y0.abs(), y1.abs());
     let far_z = most(z0.abs(), z1.abs());
     let slack = -2e-6 * (far_x + far_y + far_z);
-    let reach = |n: [f32; 3]| most(n[0] * x0, n[0] * x1) + most(n[1] * y0, n[1] * y1) + most(n[2] * z0, n[2] * z1);
+    let reach = |n: [f32; 3]| {
+        // The farther of two products is that of the corner which the factor's sign points to.
+        let corner = |n: f32, low: f32, high: f32| n * if n >= 0.0 { high } else { low };
+        corner(n[0], x0, x1) + corner(n[1], y0, y1) + corner(n[2], z0, z1)
+    };
     let side = |i: usize| reach(lens.sides[i]);
     let inside = least(least(side(0), side(1)), least(side(2), side(3)));
     // A bit more than nothing, since it is the nearest that counts and boxes are not empty.
     let seen = (inside >= slack) & (reach(lens.forward) >= View::NEAR) & there;
     let number = if ERRORS {
-        let f = lens.forward;
-        let depth = least(f[0] * x0, f[0] * x1) + least(f[1] * y0, f[1] * y1) + least(f[2] * z0, f[2] * z1);
-        let depth = most(depth, View::NEAR);
-        let across = (far_x * far_x + far_y * far_y).sqrt();
-        let away = (far_x * far_x + far_y * far_y + far_z * far_z).sqrt();
-        let (dx, dy, dz) = (x1 - x0, y1 - y0, z1 - z0);
-        let size = (dx * dx + dy * dy + dz * dz).sqrt() * 1.0001;
-        let void = deviation == f32::INFINITY;
-        let wrong = if void { size } else { deviation };
-        let distance = if void { away } else { across };
-        let spread = least(distance / (depth * depth), lens.stretch / depth);
-        wrong * (lens.focal * 1.00002) * spread
+        let [fx, fy, fz] = lens.forward;
+        let corner = |n: f32, low: f32, high: f32| n * if n >= 0.0 { low } else { high };
+        let depth = most(corner(fx, x0, x1) + corner(fy, y0, y1) + corner(fz, z0, z1), View::NEAR);
+        let flat = far_x * far_x + far_y * far_y;
+        let (wrong, distance) = if VOIDS && deviation == f32::INFINITY {
+            let (dx, dy, dz) = (x1 - x0, y1 - y0, z1 - z0);
+            ((dx * dx + dy * dy + dz * dz).sqrt() * 1.0001, (flat + far_z * far_z).sqrt())
+        } else {
+            (deviation, flat.sqrt())
+        };
+        let near = 1.0 / depth;
+        wrong * (lens.focal * 1.00002) * least(distance * near * near, lens.stretch * near)
     } else {
         let gap = |a: f32, b: f32| most(most(a, -b), 0.0);
         let (gx, gy, gz) = (gap(x0, x1), gap(y0, y1), gap(z0, z1));
@@ -291,44 +386,36 @@ fn priority<const ERRORS: bool>(lens: &Lens, at: u32, heights: u32, deviation: f
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn worst(priority: &[f32], deviation: &[f32], word: &[u32], tolerance: f32) -> (f32, bool) {
+fn worst(numbers: &[f32]) -> f32 {
     let mut greatest = [0.0f32; LANES];
-    let mut void = [0u32; LANES];
-    let n = priority.len() / LANES * LANES;
-    let chunks = priority.chunks_exact(LANES).zip(deviation.chunks_exact(LANES)).zip(word.chunks_exact(LANES));
-    for ((priority, deviation), word) in chunks {
+    let chunks = numbers.chunks_exact(LANES);
+    let rest = chunks.remainder();
+    for numbers in chunks {
         for lane in 0..LANES {
-            let p = if word[lane] & 1 == 0 { priority[lane] } else { 0.0 };
-            greatest[lane] = most(p, greatest[lane]);
-            void[lane] |= u32::from(p > tolerance) & u32::from(deviation[lane] == f32::INFINITY);
+            greatest[lane] = most(numbers[lane], greatest[lane]);
         }
     }
-    for i in n..priority.len() {
-        let p = if word[i] & 1 == 0 { priority[i] } else { 0.0 };
-        greatest[0] = most(p, greatest[0]);
-        void[0] |= u32::from(p > tolerance) & u32::from(deviation[i] == f32::INFINITY);
-    }
-    (greatest.into_iter().fold(0.0, most), void.into_iter().any(|void| void > 0))
+    rest.iter().chain(&greatest).fold(0.0, |a, &b| most(b, a))
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn within(priority: &[f32], word: &[u32], kind: u8, above: f32, most: f32, found: &mut Vec<u32>) {
-    let kind = u32::from(kind);
-    let n = priority.len() / LANES * LANES;
-    for (block, (numbers, words)) in priority.chunks_exact(LANES).zip(word.chunks_exact(LANES)).enumerate() {
+fn within(numbers: &[f32], marked: bool, above: f32, most: f32, found: &mut Vec<u32>) {
+    let chunks = numbers.chunks_exact(LANES);
+    let (rest, mut first) = (chunks.remainder(), 0);
+    let fits = |number: f32| {
+        let p = number.abs();
+        u32::from(p > above) & u32::from(p <= most) & u32::from((number.to_bits() >> 31 == 1) == marked)
+    };
+    for numbers in chunks {
         let mut mask = 0u32;
-        for lane in 0..LANES {
-            let (p, word) = (numbers[lane], words[lane]);
-            mask |= (u32::from(p > above) & u32::from(p <= most) & u32::from(word & 3 == kind)) << lane;
+        for (lane, &number) in numbers.iter().enumerate() {
+            mask |= fits(number) << lane;
         }
         while mask != 0 {
-            found.push(block as u32 * LANES as u32 + mask.trailing_zeros());
+            found.push(first + mask.trailing_zeros());
             mask &= mask - 1;
         }
+        first += LANES as u32;
     }
-    for i in n..priority.len() {
-        if priority[i] > above && priority[i] <= most && word[i] & 3 == kind {
-            found.push(i as u32);
-        }
-    }
+    found.extend(rest.iter().zip(first..).filter(|(number, _)| fits(**number) == 1).map(|(_, place)| place));
 }

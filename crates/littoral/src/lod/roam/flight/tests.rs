@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::field::{Land, Raster};
+use crate::lod::{Disc, RoamOnce};
 use glam::{DVec2, DVec3, UVec2};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -9,12 +10,13 @@ use std::collections::BTreeSet;
 /// Splits, one at a time, the triangle of greatest priority among all that are there; returns the triangles, and the greatest priority left.
 fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
     let lens = flight.lens.as_ref().expect("a view was seen");
-    let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
+    let number =
+        |diamond: Diamond| lens.priority(&flight.bounds.item(diamond, SPLIT, 0), flight.bounds.slopes(diamond));
     let mut split: BTreeSet<u64> = BTreeSet::new();
     let mut leaves: Vec<(Diamond, usize)> = vec![(Diamond::ROOT, 0), (Diamond::ROOT, 1)];
     loop {
         let splittable = leaves.iter().filter(|(d, _)| flight.idle(*d) == SPLIT && number(*d) > flight.tolerance);
-        let top = splittable.max_by_key(|(d, _)| key(number(*d), *d, 0)).copied();
+        let top = splittable.max_by_key(|(d, _)| Key::new(number(*d), *d, 0)).copied();
         let Some((top, _)) = top else { break };
         // What must be split with it: parents of parents, as far as they are not.
         let mut forced = vec![top];
@@ -55,7 +57,8 @@ fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
 /// Whether no diamond has a greater priority than those that must be split before it.
 fn nested(flight: &RoamFlight) -> bool {
     let lens = flight.lens.as_ref().expect("a view was seen");
-    let number = |diamond: Diamond| lens.priority(&flight.item(flight.bounds.bound(diamond), diamond, SPLIT, 0));
+    let number =
+        |diamond: Diamond| lens.priority(&flight.bounds.item(diamond, SPLIT, 0), flight.bounds.slopes(diamond));
     let finest = flight.bounds.finest();
     let mut level = vec![Diamond::ROOT];
     while !level.is_empty() {
@@ -83,8 +86,12 @@ fn turned(triangle: [Point; 3]) -> [Point; 3] {
 }
 
 fn drawn(flight: &RoamFlight) -> BTreeSet<[Point; 3]> {
-    let corner = |i: u32| flight.mesh.vertices[i as usize];
-    flight.mesh.triangles.iter().map(|t| turned(t.map(|i| [corner(i).x, corner(i).y]))).collect()
+    drawn_of(&flight.mesh)
+}
+
+fn drawn_of(mesh: &Mesh) -> BTreeSet<[Point; 3]> {
+    let corner = |i: u32| mesh.vertices[i as usize];
+    mesh.triangles.iter().map(|t| turned(t.map(|i| [corner(i).x, corner(i).y]))).collect()
 }
 
 fn split_set(flight: &RoamFlight) -> BTreeSet<Point> {
@@ -108,6 +115,61 @@ fn cases() -> u32 {
     std::env::var("LITTORAL_CASES").ok().and_then(|n| n.parse().ok()).unwrap_or(40)
 }
 
+fn factors() -> impl Strategy<Value = Factors> {
+    let disc = (0f64..60.0, 0f64..40.0, 0f32..20.0, 1f32..9.0);
+    let disc = disc.prop_map(|(x, y, radius, factor)| Disc { centre: DVec2::new(x, y), radius, factor });
+    let objects = prop::collection::vec(disc, 0..3);
+    let parts = (prop_oneof![Just(f32::INFINITY), 3f32..300.0], 0f32..1.0, 1f32..9.0, 0f32..3.0, objects);
+    parts.prop_map(|(fog, back_faces, silhouettes, lighting, objects)| Factors {
+        fog,
+        back_faces,
+        silhouettes,
+        lighting,
+        objects,
+    })
+}
+
+/// Each factor moves triangles to where it should.
+#[test]
+fn factors_move_triangles() {
+    // A range of hills across, and a plain roughness everywhere.
+    let at = |i: usize| ((i % 65) as f32, (i / 65) as f32);
+    let height = |i: usize| 20.0 * (-((at(i).1 - 32.0) / 6.0).powi(2)).exp() + ((i * 7919) % 101) as f32 * 0.004;
+    let land = land(65, 65, &(0..65 * 65).map(height).collect::<Vec<f32>>());
+    let bounds = NestedBounds::of(&land).expect("few samples").with_slopes();
+    let centre = |t: &[Point; 3]| {
+        let sum = t.iter().fold(DVec2::ZERO, |sum, p| sum + DVec2::new(f64::from(p[0]), f64::from(p[1])));
+        sum / (3.0 * f64::from(STEPS))
+    };
+    // How many triangles of a part (of the face) there are with factors, and how many without.
+    let counts = |factors: Factors, eye: DVec3, part: &dyn Fn(DVec2) -> bool| {
+        let once = |factors: &Factors| {
+            let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: 1_000 });
+            flight.factors = factors.clone();
+            let mut view = View::looking_at(eye, DVec3::new(96.0, 64.0, 0.0), 1.2, UVec2::new(640, 400));
+            view.tolerance_pixels = 1e-3;
+            flight.update(&view, &mut || false).expect("a view");
+            drawn(&flight).iter().filter(|t| part(centre(t))).count()
+        };
+        (once(&factors), once(&Factors::default()))
+    };
+    let (low, high) = (DVec3::new(96.0, -40.0, 8.0), DVec3::new(96.0, -40.0, 90.0));
+    let off = Factors::default();
+    let (with, without) = counts(Factors { fog: 40.0, ..off.clone() }, high, &|p| p.y > 0.6);
+    assert!(4 * with < 3 * without, "fog hides the distance: {with}, {without} triangles there");
+    let (with, without) = counts(Factors { back_faces: 0.05, ..off.clone() }, low, &|p| p.y > 0.53 && p.y < 0.6);
+    assert!(with < without, "what faces away: {with}, {without}");
+    let (with, without) = counts(Factors { silhouettes: 20.0, ..off.clone() }, high, &|p| p.y > 0.5 && p.y < 0.6);
+    assert!(with > without, "the ridge is a silhouette: {with}, {without}");
+    let (with, without) = counts(Factors { lighting: 3.0, ..off.clone() }, high, &|p| (p.y - 0.5).abs() < 0.1);
+    assert!(with > without, "the hills' slopes differ most: {with}, {without}");
+    let centre = land.origin() + DVec2::new(150.0, 100.0);
+    let disc = Disc { centre, radius: 12.0, factor: 50.0 };
+    let near = |p: DVec2| (land.origin() + p * land.extent()).distance(centre) < 15.0;
+    let (with, without) = counts(Factors { objects: vec![disc], ..off }, high, &near);
+    assert!(with > without, "a thing stands there: {with}, {without}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(cases()))]
 
@@ -122,16 +184,19 @@ proptest! {
         tolerance in 0.3f32..40.0,
         views in prop::collection::vec(((-0.5f64..1.5, -0.5f64..1.5, -20f64..120.0), (0f64..6.3, -1.5f64..0.5)), 1..6),
         distance in any::<bool>(),
+        factors in prop_oneof![Just(None), factors().prop_map(Some)],
     ) {
         let (columns, rows) = side;
         let filled = |h: &f32| if flat { 7.0 } else if h.is_nan() && !holes { 0.0 } else { *h };
         let heights: Vec<f32> = heights.iter().map(filled).take(columns * rows).collect();
         let land = land(columns, rows, &heights);
         let bounds = NestedBounds::of(&land).expect("few samples");
+        let bounds = if factors.is_some() { bounds.with_slopes() } else { bounds };
         let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: budget });
         if distance {
             flight.priority = Priority::InverseDistance;
         }
+        flight.factors = factors.unwrap_or_default();
         for ((u, v, up), (yaw, pitch)) in views {
             let eye = (land.origin() + land.extent() * DVec2::new(u, v)).extend(up);
             let ahead = DVec3::new(yaw.cos() * pitch.cos(), yaw.sin() * pitch.cos(), pitch.sin());
@@ -155,6 +220,13 @@ proptest! {
                 }
             }
             prop_assert_eq!(drawn(&flight), triangles);
+            let mut once = RoamOnce::over(&bounds, flight.limits);
+            once.priority = flight.priority;
+            once.factors = flight.factors.clone();
+            let mut mesh = Mesh::default();
+            prop_assert_eq!(once.draw(&view, &mut mesh).expect("a view"), reached);
+            prop_assert_eq!(mesh.triangles.len(), flight.mesh.triangles.len());
+            prop_assert_eq!(drawn_of(&mesh), drawn(&flight));
             if reached.pixels.is_finite() {
                 prop_assert_eq!(reached.pixels, worst);
             }
@@ -190,8 +262,17 @@ fn stopped_frames_catch_up() {
             asked += 1;
             asked > 2
         };
+        let before = flight.operations();
         let reached = flight.update(&look(60.0), &mut stop).expect("a view");
         assert!(flight.triangles() <= 1_500, "frame {frame}");
+        let done = flight.operations().0 + flight.operations().1 - before.0 - before.1;
+        assert!(done <= 3 * 16, "frame {frame}: {done} steps after it was told to stop");
+        let area = |[a, b, c]: [Point; 3]| {
+            let [a, b, c] = [a, b, c].map(|p| p.map(i64::from));
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        let covered: i64 = drawn(&flight).into_iter().map(area).sum();
+        assert_eq!(covered, 2 << 60, "frame {frame} is whole");
         worst = reached.pixels;
         if asked <= 2 {
             break;
