@@ -19,7 +19,7 @@ fn over_hills(tolerance_pixels: f32) -> View {
 #[test]
 fn budgets_are_used() {
     let field = hills();
-    for (name, share) in [("nested", 0.8), ("quadtree", 0.85), ("patches", 0.95)] {
+    for (name, share) in [("nested", 0.8), ("quadtree", 0.85), ("patches", 0.95), ("strips", 0.8)] {
         let method = METHODS.iter().find(|method| method.name == name).expect("a method");
         for triangles in [20_000, 70_000] {
             let mut drawing = Drawing::default();

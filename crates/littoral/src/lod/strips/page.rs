@@ -83,14 +83,9 @@ impl Page {
     pub fn refine(&mut self, asked: &Asked) -> f32 {
         let (mut worst, mut lines) = (0.0f32, [Line::default(); 3]);
         for level in 1..=self.depth {
-            let mut some = false;
             let mut cells = [0; SIDE];
             for y in 0..1u32 << level {
                 cells[y as usize] = self.quarters(level, y);
-                some |= cells[y as usize] != 0;
-            }
-            if !some {
-                break;
             }
             let cuts = self.cell.level + level < asked.finest;
             worst = self.measure(asked, &mut lines, level, &cells, cuts).max(worst);
@@ -102,17 +97,13 @@ impl Page {
     pub fn settle(&mut self, asked: &Asked) {
         let mut lines = [Line::default(); 3];
         for level in 1..=self.depth {
-            let mut some = false;
             let mut cells = [0; SIDE];
             for y in 0..1u32 << level {
                 // What was measured and is not seen is measured again: that is little.
                 let at = row(level, y);
                 cells[y as usize] = self.quarters(level, y) & !self.cut[at] & !self.drawn[at];
-                some |= cells[y as usize] != 0;
             }
-            if some {
-                self.measure(asked, &mut lines, level, &cells, false);
-            }
+            self.measure(asked, &mut lines, level, &cells, false);
         }
         self.drawn.iter_mut().zip(&self.cut).for_each(|(drawn, cut)| *drawn &= !cut);
     }
@@ -127,8 +118,10 @@ impl Page {
     fn measure(&mut self, asked: &Asked, lines: &mut [Line; 3], level: u8, cells: &[u64; SIDE], cuts: bool) -> f32 {
         let (mut worst, most) = (0.0f32, if cuts { asked.tolerance } else { f32::INFINITY });
         let side = 1usize << level;
+        let Some(first) = cells[..side].iter().position(|&bits| bits != 0) else { return worst };
+        let last = cells[..side].iter().rposition(|&bits| bits != 0).unwrap_or(first);
         // Row y is judged when the row beyond it is known: a cell's bound takes the nearest of its neighbours.
-        for next in 0..=side + 1 {
+        for next in first..=last + 2 {
             // Rows are counted from the one before the page.
             let wanted = |y: usize| if (1..=side).contains(&y) { cells[y - 1] } else { 0 };
             let near = wanted(next) | wanted(next + 1) | if next > 0 { wanted(next - 1) } else { 0 };
@@ -137,7 +130,7 @@ impl Page {
             if near != 0 {
                 self.line(asked, level, next as i64 - 1, near.trailing_zeros()..64 - near.leading_zeros(), line);
             }
-            let Some(y) = next.checked_sub(2) else { continue };
+            let Some(y) = next.checked_sub(2).filter(|&y| y >= first) else { continue };
             let bits = cells[y];
             if bits == 0 {
                 continue;
