@@ -118,19 +118,19 @@ impl Strips {
         }
         self.tiers[0].page(face);
         worst = 0.0;
-        let most = 4 * self.limits.triangles.max(64);
+        // A page has at least three cells that are seen, or nearly so: pages that would be too many are not made.
+        let (mut leaves, most) = (0, self.limits.triangles.max(64) / 3 * 2);
         for i in 0..tiers {
             let (coarse, fine) = self.tiers.split_at_mut(i + 1);
             let tier = &mut coarse[i];
             worst = tier.each(|page| page.refine(&asked), f32::max).map_or(worst, |bound| bound.max(worst));
-            let mut cut = 0;
-            for page in &tier.pages {
-                cut += page.cut.iter().map(|bits| bits.count_ones() as usize).sum::<usize>();
-                let Some(fine) = fine.first_mut() else { continue };
-                for_bits(page, |cell| _ = fine.page(cell));
+            leaves += tier.pages.iter().map(Page::count).sum::<usize>();
+            let pages = tier.pages.iter().map(Page::below).sum::<usize>();
+            if leaves + 3 * pages > most {
+                return Err(leaves + 3 * pages);
             }
-            if 6 * cut > most {
-                return Err(3 * cut);
+            if let Some(fine) = fine.first_mut() {
+                tier.pages.iter().for_each(|page| for_bits(page, |cell| _ = fine.page(cell)));
             }
         }
         self.balance();
@@ -238,14 +238,13 @@ impl Tier {
             let first = y == 0 && cell.y > 0;
             let last = y == side - 1 && cell.y + 1 < cells;
             if first {
-                self.page(Cell { y: cell.y - 1, ..cell }).cut[page::row(level - 1, half - 1 + u32::from(half == 0))] |=
-                    halve(bits);
+                self.page(Cell { y: cell.y - 1, ..cell }).cut[page::row(level - 1, half - 1)] |= halve(bits);
             }
             if last {
                 self.page(Cell { y: cell.y + 1, ..cell }).cut[page::row(level - 1, 0)] |= halve(bits);
             }
             if bits & 1 == 1 && cell.x > 0 {
-                self.page(Cell { x: cell.x - 1, ..cell }).cut[page::row(level - 1, y >> 1)] |= 1 << (half.max(1) - 1);
+                self.page(Cell { x: cell.x - 1, ..cell }).cut[page::row(level - 1, y >> 1)] |= 1 << (half - 1);
             }
             if bits >> (side - 1) & 1 == 1 && cell.x + 1 < cells {
                 self.page(Cell { x: cell.x + 1, ..cell }).cut[page::row(level - 1, y >> 1)] |= 1;
