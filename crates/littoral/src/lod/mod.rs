@@ -5,8 +5,9 @@
 //! place than the view tolerates, and where a limit forbids that, the bound that was reached is told. They differ in what they spend on it.
 //! Voids are never bridged: what is partly void is refined until it is whole or nothing, or too small to matter, and then left out.
 //!
-//! A drawing has two forms. Most methods put out *patches*: affine images of one stencil, which a GPU draws as instances. Others keep a mesh of
-//! their own. [`Drawing::expand`] turns patches into the second form, so that whoever wants triangles finds one thing.
+//! A drawing has three forms. Most methods put out *patches*: affine images of one stencil, which a GPU draws as instances. Others keep a mesh of
+//! their own, and one puts out *strips* of triangles. [`Drawing::expand`] turns patches and strips into triangles of the mesh, so that whoever wants those finds one
+//! thing.
 //!
 //! Vertices are named by integers on the lattice of a face, 2³⁰ steps a side: neighbours agree to the bit, and whether a drawing is
 //! watertight is decided exactly.
