@@ -3,7 +3,7 @@
 use crate::input;
 use crate::render::Render;
 use crate::subject::Subject;
-use crate::talk::{Failure, Talk, tidy};
+use crate::talk::{Failure, Talk, progress, tidy};
 use clap::ValueEnum;
 use glam::DVec3;
 use littoral::field::{HeightField, Land, Sea};
@@ -95,7 +95,13 @@ pub struct Told {
 impl Detail {
     /// What lets ROAM go on from picture to picture over a land, if that is what is wanted and the land is not too large.
     pub fn prepare(&self, land: &Land) -> Option<NestedBounds> {
-        (self.lod == Some(Method::Roam)).then(|| NestedBounds::of(land).ok()).flatten()
+        if self.lod != Some(Method::Roam) {
+            return None;
+        }
+        let bar = progress(1, "preparing");
+        let bounds = NestedBounds::of(land).ok();
+        bar.finish_and_clear();
+        bounds
     }
 
     /// The method that is wanted, if any, over a land that may have been prepared.

@@ -1,24 +1,20 @@
 //! ROAM in flight: milliseconds a frame, splits and merges a second, work against speed; from scratch, over a sea, and with a clock.
 //!
-//! The scene is that of `benches/rays.rs`: 30 km in 4097² samples of fractal noise, or the raw `f32` heights that the environment variable `LITTORAL_MAP`
-//! names. The flight is at 60 frames/s, 300 m above the ground ahead, 60° vertically, 1920 × 1080 pixels. Processor time.
+//! The flight is at 60 frames/s, 300 m above the ground ahead, 60° vertically, 1920 × 1080 pixels. Processor time.
 //!
 //! `cargo bench -p littoral --bench roam -- [scratch] [flight] [clock] [csv] [sea] [1999]`: all of them but `csv` if none is named; `csv` prints a table of
 //! work against speed.
 
 mod clock;
+mod scene;
 
 use clock::{median, processor_time};
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
-use littoral::field::noise::Fbm;
 use littoral::field::{Land, Raster, Sea, coast};
 use littoral::lod::{Drawing, Limits, Lod, Mesh, NestedBounds, Priority, Roam, RoamFlight, RoamOnce};
 use littoral::space::{Datum, View};
 use littoral::waves::{Depths, Length, Path, Peachey, Sine, Sines, StillWater, Superposition, Surf, Swell};
 use std::hint::black_box;
-
-const EXTENT: f64 = 30_000.0;
-const SAMPLES: usize = 4097;
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
@@ -32,10 +28,7 @@ fn main() {
     if !["scratch", "flight", "clock", "csv"].into_iter().any(wanted) {
         return;
     }
-    let land = match std::env::var("LITTORAL_MAP") {
-        Ok(path) => measured(&path),
-        Err(_) => invented(SAMPLES),
-    };
+    let land = scene::mountains();
     let begin = processor_time();
     let bounds = NestedBounds::of(&land).expect("few samples");
     eprintln!(
@@ -350,24 +343,4 @@ fn frames_of_1999(name: &str, mut sea: Sea, size: DVec2) {
         selection[300],
         selection[594]
     );
-}
-
-fn measured(path: &str) -> Land {
-    let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("cannot read {path}: {e}"));
-    assert_eq!(bytes.len(), SAMPLES * SAMPLES * 4, "expected {SAMPLES}² raw f32 heights in {path}");
-    let heights = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    placed(SAMPLES, heights.collect())
-}
-
-fn invented(samples: usize) -> Land {
-    let fbm = Fbm::new(8000.0, 1200.0, 12, 7);
-    let step = EXTENT / (samples - 1) as f64;
-    let at = |i: usize| DVec2::new((i % samples) as f64, (i / samples) as f64) * step;
-    placed(samples, (0..samples * samples).map(|i| fbm.at(at(i)).value as f32).collect())
-}
-
-fn placed(samples: usize, heights: Vec<f32>) -> Land {
-    Land::new(
-        Raster::new(samples, samples, DVec2::splat(EXTENT / (samples - 1) as f64), heights).expect("sizes are valid"),
-    )
 }

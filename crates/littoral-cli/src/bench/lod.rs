@@ -116,8 +116,15 @@ impl Lod {
         let waves = Superposition::of_state(&coast::sea_state(), 16, 8)
             .map_err(|e| Failure::Work(format!("the sea of the measurement: {e}")))?;
         let sea = Sea::new(datum, 0.0).with(Box::new(waves));
-        let prepare = |land: &Land| NestedBounds::of(land).map_err(|e| Failure::Work(e.to_string()));
+        counted::count();
+        let bar = progress(2, "preparing");
+        let prepare = |land: &Land| {
+            let bounds = NestedBounds::of(land).map_err(|e| Failure::Work(e.to_string()));
+            bar.inc(1);
+            bounds
+        };
         let bounds = [prepare(&mountains)?, prepare(&coast)?];
+        bar.finish_and_clear();
         let flights = flights(&mountains, &coast, &sea, &bounds);
         let runs = if self.plot.is_some() { 1 + SWEEP.len() } else { 1 };
         let bar = progress((flights.len() * Method::value_variants().len() * runs) as u64, "flying");
@@ -219,7 +226,7 @@ impl Lod {
         // What goes when they go is what they held.
         let held = counted::held();
         drop((lod, roam, drawing));
-        let memory = held.saturating_sub(counted::held());
+        let memory = (held - counted::held()).max(0);
         errors.sort_by(f32::total_cmp);
         evaluated.sort_unstable();
         [&mut select, &mut expand].into_iter().for_each(|times| times.sort_by(f64::total_cmp));

@@ -228,6 +228,12 @@ fn triangle(patch: &Patch, heights: &[f32], mesh: &mut Mesh) {
     mesh.triangles.push([base, base + 1, base + 2]);
 }
 
+/// The two triangles of a cell, corners south-west, south-east, north-west, north-east: diagonals run from the middle of each block of 2 × 2 cells to its
+/// corners.
+pub(super) fn halves(column: u32, row: u32, [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+    if (column + row) & 1 == 0 { [[a, b, d], [a, d, c]] } else { [[a, b, c], [b, d, c]] }
+}
+
 /// Appends the triangles of a square patch of n × n cells.
 fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
     let base = mesh.vertices.len() as u32;
@@ -291,13 +297,7 @@ fn square(patch: &Patch, n: u32, heights: &[f32], mesh: &mut Mesh) {
                 continue;
             }
             let [a, b, c, d] = [(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)].map(|(i, j)| kept(i, j));
-            if (i + j) & 1 == 0 {
-                push([a, b, d]);
-                push([a, d, c]);
-            } else {
-                push([a, b, c]);
-                push([b, d, c]);
-            }
+            halves(i, j, [a, b, c, d]).into_iter().for_each(&mut push);
         }
     }
     if south || east || north || west {

@@ -19,7 +19,7 @@
 mod layer;
 mod window;
 
-use super::drawing::{STEPS, Vertex, coarse_ends};
+use super::drawing::{STEPS, Vertex, coarse_ends, halves};
 use super::{Drawing, Limits, Lod, Reached, ScreenMetric, Stencil, ViewError};
 use crate::field::HeightField;
 use crate::space::{Place, View};
@@ -295,29 +295,17 @@ impl Nested {
                     mesh.triangles.push(corners);
                 }
             };
-            let mut cell = |i: u32, j: u32, [a, b, c, d]: [u32; 4]| {
-                if (i + j) & 1 == 0 {
-                    push([a, b, d]);
-                    push([a, d, c]);
-                } else {
-                    push([a, b, c]);
-                    push([b, d, c]);
-                }
-            };
             layer.runs(|j, from, to| {
                 // Vertices of a row follow each other, and only those of the border may be left out.
                 let (south, north) = (layer.vertex(from, j), layer.vertex(from, j + 1));
                 for i in from..to {
                     let (a, c) = (south + (i - from), north + (i - from));
                     let border = i == 0 || j == 0 || i + 1 == side || j + 1 == side;
-                    cell(
-                        i,
-                        j,
-                        match border {
-                            false => [a, a + 1, c, c + 1],
-                            true => [kept(i, j), kept(i + 1, j), kept(i, j + 1), kept(i + 1, j + 1)],
-                        },
-                    );
+                    let corners = match border {
+                        false => [a, a + 1, c, c + 1],
+                        true => [kept(i, j), kept(i + 1, j), kept(i, j + 1), kept(i + 1, j + 1)],
+                    };
+                    halves(i, j, corners).into_iter().for_each(&mut push);
                 }
             });
             for k in (1..side).step_by(2) {

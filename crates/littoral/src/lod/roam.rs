@@ -13,7 +13,7 @@
 //! what must be split for it, in any order, ends in it. Steps taken in falling order pass through all of them. A bound may grow when a
 //! triangle is split; so if the budget ends the process, the result is the state before whose worst triangle was least.
 //!
-//! Vertices appear and vanish in one step: a mesh of so few triangles has no level to morph to (the patches and the quadtree have).
+//! Vertices appear and vanish in one step: a mesh of so few triangles has no level to morph to (the quadtree and the nested grids have).
 //!
 //! Works this rests on: M. Duchaineau, M. Wolinsky, D. Sigeti, M. Miller, C. Aldrich, M. Mineev-Weinstein, "ROAMing terrain: real-time optimally
 //! adapting meshes", 1997; spec page of 1999, which uses it for a sea; P. Lindstrom and V. Pascucci, "Terrain simplification

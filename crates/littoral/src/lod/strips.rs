@@ -31,6 +31,7 @@ pub struct Strips {
     tiers: Vec<Tier>,
     /// Tier and number of pages, the nearest first, with their distances.
     order: Vec<(f64, u32, u32)>,
+    /// At least one.
     walked: Vec<Walked>,
 }
 
@@ -91,7 +92,7 @@ impl Tier {
 impl Strips {
     /// The method within limits.
     pub fn new(limits: Limits) -> Strips {
-        Strips { limits, tiers: Vec::new(), order: Vec::new(), walked: Vec::new() }
+        Strips { limits, tiers: Vec::new(), order: Vec::new(), walked: vec![Walked::default()] }
     }
 
     /// Cuts what `tolerance` asks for, and what neighbours then need; the bound reached (pixels) and the number of cells, or, if that takes more
@@ -106,8 +107,7 @@ impl Strips {
         let asked = Asked { field, metric, tolerance, finest };
         // Pages end at the finest level; the first takes what is left above them.
         let tiers = usize::from(finest.div_ceil(DEPTH));
-        self.tiers.resize_with(tiers.max(self.tiers.len()), Tier::default);
-        self.tiers.truncate(tiers);
+        self.tiers.resize_with(tiers, Tier::default);
         for (i, tier) in self.tiers.iter_mut().enumerate() {
             tier.clear(if i == 0 { finest - DEPTH * (tiers as u8 - 1) } else { DEPTH });
         }
@@ -302,9 +302,9 @@ impl Strips {
         }
         let (tiers, order) = (&self.tiers, &self.order);
         if order.len() < FEW || rayon::current_num_threads() == 1 {
-            let walked = one(&mut self.walked);
             for pages in order.chunks(TOGETHER) {
-                walked.pages(tiers, pages, turned, field, &mut drawing.mesh.vertices, &mut drawing.strips);
+                let Drawing { mesh, strips, .. } = &mut *drawing;
+                self.walked[0].pages(tiers, pages, turned, field, &mut mesh.vertices, strips);
             }
             return;
         }
@@ -323,12 +323,6 @@ impl Strips {
             drawing.strips.extend(walked.ends.iter().map(|end| base + end));
         }
     }
-}
-
-/// The first of those who walk.
-fn one(walked: &mut Vec<Walked>) -> &mut Walked {
-    walked.resize_with(walked.len().max(1), Walked::default);
-    &mut walked[0]
 }
 
 impl Walked {

@@ -3,41 +3,53 @@
 use littoral::field::{HeightField, HeightRange};
 use littoral::space::{Cell, Datum, Place};
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicIsize, AtomicUsize, Ordering::Relaxed};
 
-/// The system's allocator, counting what is held.
+/// The system's allocator, counting what is held while it is asked to.
 struct Counting;
 
-static HELD: AtomicUsize = AtomicUsize::new(0);
+/// Whether it counts: other commands pay for a look at this, not for a number that all threads write.
+static COUNTS: AtomicBool = AtomicBool::new(false);
+static HELD: AtomicIsize = AtomicIsize::new(0);
 
-/// Bytes of memory that the program holds.
-pub fn held() -> usize {
+/// Begins to count.
+pub fn count() {
+    COUNTS.store(true, Relaxed);
+}
+
+/// Bytes of memory that the program took less those it gave back since it began to count.
+pub fn held() -> isize {
     HELD.load(Relaxed)
+}
+
+fn add(bytes: isize) {
+    if COUNTS.load(Relaxed) {
+        HELD.fetch_add(bytes, Relaxed);
+    }
 }
 
 // SAFETY: every call goes to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        HELD.fetch_add(layout.size(), Relaxed);
+        add(layout.size() as isize);
         // SAFETY: the caller's promises are those of `System`.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        HELD.fetch_add(layout.size(), Relaxed);
+        add(layout.size() as isize);
         // SAFETY: as above.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        HELD.fetch_sub(layout.size(), Relaxed);
+        add(-(layout.size() as isize));
         // SAFETY: as above.
         unsafe { System.dealloc(at, layout) }
     }
 
     unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        HELD.fetch_add(size, Relaxed);
-        HELD.fetch_sub(layout.size(), Relaxed);
+        add(size as isize - layout.size() as isize);
         // SAFETY: as above.
         unsafe { System.realloc(at, layout, size) }
     }
@@ -83,6 +95,10 @@ impl HeightField for Counted<'_> {
 
     fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {
         self.field.stencil_error(cell, depth)
+    }
+
+    fn row(&self, first: Cell, ranges: &mut [HeightRange], errors: &mut [f32]) {
+        self.field.row(first, ranges, errors);
     }
 
     fn fill(&self, cell: Cell, side: usize, heights: &mut [f32]) {

@@ -19,7 +19,7 @@ use super::CORNERS;
 use super::bounds::{Bound, NestedBounds};
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
 use super::factors::Factors;
-use super::scan::{Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
+use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use super::scratch::Search;
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
 use crate::space::{Place, View};
@@ -100,7 +100,13 @@ pub struct RoamFlight<'a> {
     operations: (u64, u64),
 }
 
+const _: () = assert!(RoamFlight::MOST / 2 * 3 < 1 << Item::RECORD_BITS);
+
 impl<'a> RoamFlight<'a> {
+    /// The most triangles that a flight draws, whatever its limits: entries of its list name records by 25 bits, and a mesh of n triangles takes no more than 1.5 n
+    /// records.
+    pub const MOST: usize = 20_000_000;
+
     /// A flight over prepared land, with nothing drawn yet.
     pub fn over(bounds: &'a NestedBounds, limits: Limits) -> RoamFlight<'a> {
         RoamFlight {
@@ -239,6 +245,11 @@ impl<'a> RoamFlight<'a> {
 
     fn vertex(&self, at: Point) -> Vertex {
         Vertex { x: at[0], y: at[1], face: 0, height: self.bounds.height(at) }
+    }
+
+    /// The most triangles.
+    fn budget(&self) -> usize {
+        self.limits.triangles.clamp(2, RoamFlight::MOST)
     }
 
     /// The level of cells that are not split any more.

@@ -132,9 +132,12 @@ impl Item {
         Cell::MAX_LEVEL - 1 - shift - (self.word >> 3 & 15) as u8
     }
 
+    /// Bits of a record's number.
+    pub(super) const RECORD_BITS: u32 = 25;
+
     #[inline]
     pub(super) fn word(kind: u8, square: bool, unit: u32, record: u32) -> u32 {
-        u32::from(kind) | u32::from(square) << 2 | unit.trailing_zeros() << 3 | record << 7
+        u32::from(kind) | u32::from(square) << 2 | unit.trailing_zeros() << 3 | record << (32 - Item::RECORD_BITS)
     }
 }
 
@@ -208,7 +211,7 @@ impl List {
 
     /// The record of an entry.
     pub(super) fn record(&self, place: u32) -> u32 {
-        self.items[place as usize].word >> 7
+        self.items[place as usize].word >> (32 - Item::RECORD_BITS)
     }
 
     /// The middle of an entry's base (steps).
@@ -239,7 +242,7 @@ impl List {
     /// Records of all places, left ones included.
     #[cfg(test)]
     pub(super) fn word_records(&self) -> impl Iterator<Item = u32> + '_ {
-        self.items.iter().map(|item| item.word >> 7)
+        self.items.iter().map(|item| item.word >> (32 - Item::RECORD_BITS))
     }
 
     /// Measures all whose number lies in `part`.

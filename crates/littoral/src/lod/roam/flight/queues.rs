@@ -103,7 +103,7 @@ impl RoamFlight<'_> {
     /// From scratch: what is to be split is searched for without a record of anything, then split without a queue.
     pub(super) fn descend(&mut self) {
         let Some(lens) = &self.lens else { return };
-        let budget = self.limits.triangles.max(2);
+        let budget = self.budget();
         let finest = self.finest();
         let (bits, level, name) = self.search.run(self.bounds, lens, finest, self.tolerance, budget).last;
         self.border = f32::from_bits(bits);
@@ -161,7 +161,7 @@ impl RoamFlight<'_> {
 
     /// Splits and merges until the queues agree; whether it was stopped.
     pub(super) fn balance(&mut self, stop: &mut dyn FnMut() -> bool) -> bool {
-        let (budget, tolerance) = (self.limits.triangles.max(2), self.tolerance);
+        let (budget, tolerance) = (self.budget(), self.tolerance);
         let border = self.border.max(tolerance);
         self.widen((border / BAND).max(tolerance), (border * BAND).max(tolerance));
         let mut wider = BAND;
