@@ -6,7 +6,7 @@ use crate::subject::Subject;
 use crate::talk::{Failure, Talk, progress, seconds as shown_seconds, tidy};
 use glam::{DVec2, UVec2};
 use littoral::field::Sea;
-use littoral::flight::{Flight, FlightPath, Level, Look, Pace, Spot};
+use littoral::flight::{Flight, FlightPath, Pace};
 use littoral::picture::{Border, Display, Exposure, Settings, Stage, suiting_border};
 use littoral::space::View;
 use littoral_data::path::{Coordinates, SavedPath};
@@ -193,19 +193,14 @@ impl Order<'_> {
             Coordinates::File => subject.local(System::File, xy).ok(),
             Coordinates::LonLat => subject.local(System::LonLat, xy).ok(),
         };
-        let mut path = saved.placed(local).map_err(|point| {
+        let path = saved.placed(local).map_err(|point| {
             let file = file.display();
             let name = &subject.name;
             Failure::Work(format!(
                 "{file}: point {point}: expected coordinates that {name} can place, got others; change \"coordinates\""
             ))
         })?;
-        for point in &mut path.points {
-            stretch(&mut point.spot, subject.exaggeration);
-            if let Look::At(spot) = &mut point.look {
-                stretch(spot, subject.exaggeration);
-            }
-        }
+        let mut path = path.stretched(subject.exaggeration);
         if let Some(seconds) = self.seconds {
             path.pace = Pace::Duration(seconds);
         }
@@ -263,33 +258,8 @@ fn steady_grey(flight: &Flight<'_>, stage: &Stage<'_>, view: &dyn Fn(f64, UVec2)
     mean.exp()
 }
 
-/// Heights above ground and above sea level grow with the land.
-fn stretch(spot: &mut Spot, factor: f64) {
-    match &mut spot.level {
-        Level::AboveGround(z) | Level::Absolute(z) => *z *= factor,
-    }
-}
-
 /// A path as it is saved: in the file's coordinates, unstretched.
 fn saved(subject: &Subject, path: &FlightPath) -> SavedPath {
-    let mut path = path.clone();
-    let round = |value: f64, decimals: usize| {
-        let power = 10f64.powi(decimals as i32);
-        (value * power).round() / power
-    };
-    let decimals = subject.frame.decimals();
-    let place = |spot: &mut Spot| {
-        spot.xy = subject.frame.crs(spot.xy);
-        spot.xy = DVec2::new(round(spot.xy.x, decimals), round(spot.xy.y, decimals));
-        match &mut spot.level {
-            Level::AboveGround(z) | Level::Absolute(z) => *z = round(*z / subject.exaggeration, 2),
-        }
-    };
-    for point in &mut path.points {
-        place(&mut point.spot);
-        if let Look::At(spot) = &mut point.look {
-            place(spot);
-        }
-    }
-    SavedPath { coordinates: Coordinates::File, path }
+    let path = path.clone().stretched(1.0 / subject.exaggeration);
+    SavedPath::of(&path, |xy| subject.frame.crs(xy), subject.frame.decimals())
 }

@@ -68,6 +68,29 @@ impl SavedPath {
         Ok(path)
     }
 
+    /// A path in a land's metres as it is saved: in the file's coordinates (`crs_from_local`, so many decimals are kept of them), its heights to a
+    /// centimetre.
+    pub fn of(path: &FlightPath, crs_from_local: impl Fn(DVec2) -> DVec2, decimals: usize) -> SavedPath {
+        let round = |value: f64, decimals: usize| {
+            let power = 10f64.powi(decimals as i32);
+            (value * power).round() / power
+        };
+        let place = |spot: &mut Spot| {
+            let xy = crs_from_local(spot.xy);
+            spot.xy = DVec2::new(round(xy.x, decimals), round(xy.y, decimals));
+            let (Level::AboveGround(z) | Level::Absolute(z)) = &mut spot.level;
+            *z = round(*z, 2);
+        };
+        let mut path = path.clone();
+        for point in &mut path.points {
+            place(&mut point.spot);
+            if let Look::At(spot) = &mut point.look {
+                place(spot);
+            }
+        }
+        SavedPath { coordinates: Coordinates::File, path }
+    }
+
     /// Saves the path, whole or not at all.
     ///
     /// # Errors

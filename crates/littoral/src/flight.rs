@@ -234,6 +234,21 @@ impl FlightPath {
         FlightPath::orbit(centre, 1.85 * radius, 0.4 * (high - low) + 1.15 * radius, seconds)
     }
 
+    /// The same path over ground whose heights are multiplied by `factor`: heights above ground and above sea level grow with it.
+    pub fn stretched(mut self, factor: f64) -> FlightPath {
+        let stretch = |spot: &mut Spot| {
+            let (Level::AboveGround(z) | Level::Absolute(z)) = &mut spot.level;
+            *z *= factor;
+        };
+        for point in &mut self.points {
+            stretch(&mut point.spot);
+            if let Look::At(spot) = &mut point.look {
+                stretch(spot);
+            }
+        }
+        self
+    }
+
     /// Resolves the path over a ground.
     ///
     /// Points that have their clearance are passed through exactly, unless ground within about a second of flight

@@ -1,0 +1,419 @@
+//! The state of a flight, apart from window and scene: what is wished for, what came, and what the hands do with it.
+
+use crate::camera::{Camera, Hands, Mode, World};
+use crate::draw;
+use crate::editor::Editor;
+use crate::scene::{Frame, Look, News, Wish};
+use crate::settings::Settings;
+use crate::subject::{Order, Subject};
+use crate::tape::Tape;
+use glam::{DVec2, DVec3, UVec2, Vec2};
+use littoral::flight::{FlightPath, Pace};
+use littoral::picture::{Shot, Sun};
+use littoral::space::View;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The mesh is chosen for so much more than the frame, so that what a turn brings in is there already.
+const WIDER: f64 = 1.2;
+
+/// So many frames are remembered for the plots.
+const HISTORY: usize = 240;
+
+/// How long a note stays (s).
+const NOTE_SECONDS: f64 = 14.0;
+
+/// Numbers of the last frames.
+#[derive(Debug, Default)]
+pub struct History {
+    /// From frame to frame (ms).
+    pub frame: VecDeque<f32>,
+    /// Choosing triangles (ms).
+    pub method: VecDeque<f32>,
+    /// Triangles.
+    pub triangles: VecDeque<f32>,
+    /// The bound that was reached (pixels).
+    pub bound: VecDeque<f32>,
+}
+
+impl History {
+    fn push(list: &mut VecDeque<f32>, value: f64) {
+        if list.len() == HISTORY {
+            list.pop_front();
+        }
+        list.push_back(value as f32);
+    }
+}
+
+/// The middle one of some numbers; 0 of none.
+pub fn median(numbers: impl IntoIterator<Item = f32>) -> f32 {
+    let mut sorted: Vec<f32> = numbers.into_iter().collect();
+    sorted.sort_by(f32::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Something to be read.
+#[derive(Clone, Debug)]
+pub struct Note {
+    /// What.
+    pub text: String,
+    /// Until when (s, of the cockpit's clock).
+    pub until: f64,
+}
+
+/// A flight.
+pub struct Cockpit {
+    /// What is remembered.
+    pub settings: Settings,
+    /// What is open, or being opened.
+    pub order: Order,
+    /// The land.
+    pub subject: Option<Arc<Subject>>,
+    serial: u64,
+    shot: Option<Shot>,
+    /// Its light and colours.
+    pub scenery: Option<Arc<draw::Scenery>>,
+    /// The newest meshes.
+    pub frame: Option<Frame>,
+    /// The eye.
+    pub camera: Camera,
+    /// The view that triangles are chosen for, if it is not the eye's.
+    pub frozen: Option<View>,
+    /// The path that is made.
+    pub editor: Editor,
+    /// Whether clicks make it.
+    pub editing: bool,
+    /// Where it is saved.
+    pub path_file: String,
+    /// The path as it is flown, at an even pace, for drawing and playing.
+    pub tape: Option<Tape>,
+    taped: Option<FlightPath>,
+    /// The instant of the flight along the path (s), if it is flown.
+    pub playing: Option<f64>,
+    /// Whether it stands still there.
+    pub paused: bool,
+    /// The instant of the sea (s).
+    pub time: f64,
+    /// Whether that stands still.
+    pub still: bool,
+    /// What is being done in the background.
+    pub working: Option<(String, f32)>,
+    /// What is to be read.
+    pub notes: Vec<Note>,
+    /// Numbers.
+    pub history: History,
+    /// What the sea's state is while it is typed.
+    pub sea_text: String,
+    clock: f64,
+}
+
+impl Cockpit {
+    /// Over some files, or the built-in coast.
+    pub fn new(settings: Settings, files: Vec<PathBuf>) -> Cockpit {
+        let mut camera = Camera::new(DVec3::new(0.0, 0.0, 1000.0), DVec3::Y);
+        camera.speed = settings.speed;
+        Cockpit {
+            order: Order { files, exaggeration: settings.exaggeration },
+            sea_text: settings.sea.clone(),
+            settings,
+            subject: None,
+            serial: 0,
+            shot: None,
+            scenery: None,
+            frame: None,
+            camera,
+            frozen: None,
+            editor: Editor::default(),
+            editing: false,
+            path_file: "path.toml".to_owned(),
+            tape: None,
+            taped: None,
+            playing: None,
+            paused: false,
+            time: 0.0,
+            still: false,
+            working: Some(("opening".to_owned(), 0.0)),
+            notes: Vec::new(),
+            history: History::default(),
+            clock: 0.0,
+        }
+    }
+
+    /// Shows a sentence for a while.
+    pub fn note(&mut self, text: impl Into<String>) {
+        let (text, until) = (text.into(), self.clock + NOTE_SECONDS);
+        self.notes.retain(|note| note.text != text);
+        self.notes.push(Note { text, until });
+    }
+
+    /// Takes what the scene tells.
+    pub fn hear(&mut self, news: News) {
+        match news {
+            News::Working(what, done) => self.working = Some((what, done)),
+            News::Idle => self.working = None,
+            News::Note(text) => self.note(text),
+            News::Refused(problem) => {
+                self.note(problem);
+                // What was there is flown on; where nothing was, the built-in coast.
+                self.order = match &self.subject {
+                    Some(subject) => subject.order.clone(),
+                    None => Order { files: Vec::new(), exaggeration: 1.0 },
+                };
+                self.settings.exaggeration = self.order.exaggeration;
+            }
+            News::Arrived(subject, shot, serial) => self.arrive(subject, *shot, serial),
+            News::Scenery(scenery, serial) => {
+                if serial == self.serial {
+                    self.scenery = Some(scenery);
+                }
+            }
+            News::Frame(frame) => {
+                if frame.serial == self.serial {
+                    if let Some(heights) = frame.heights {
+                        self.camera.boat.float(heights);
+                    }
+                    History::push(&mut self.history.method, frame.milliseconds);
+                    History::push(&mut self.history.triangles, frame.triangles() as f64);
+                    History::push(&mut self.history.bound, f64::from(frame.bound_pixels));
+                    self.frame = Some(*frame);
+                }
+            }
+        }
+    }
+
+    fn arrive(&mut self, subject: Arc<Subject>, shot: Shot, serial: u64) {
+        let stretch = self.subject.as_ref().and_then(|before| {
+            let same = before.order.files == subject.order.files;
+            same.then(|| subject.order.exaggeration / before.order.exaggeration)
+        });
+        subject.notes.clone().into_iter().for_each(|note| self.note(note));
+        (self.serial, self.scenery, self.frame, self.frozen) = (serial, None, None, None);
+        (self.taped, self.tape, self.playing) = (None, None, None);
+        self.subject = Some(subject);
+        match stretch {
+            // The same land, stretched: whoever flies stays where he is.
+            Some(factor) => {
+                self.camera.eye.z *= factor;
+                let path = self.editor.path().clone().stretched(factor);
+                self.editor.replace(path);
+            }
+            None => {
+                if !self.editor.path().points.is_empty() {
+                    self.editor = Editor::default();
+                }
+            }
+        }
+        self.shot = Some(shot);
+        if stretch.is_none() {
+            self.home();
+            if self.settings.mode != Mode::Fly {
+                self.change_mode(self.settings.mode);
+            }
+        }
+    }
+
+    /// Back to the good view.
+    pub fn home(&mut self) {
+        if let Some(shot) = &self.shot {
+            let direction = shot.view.direction(0.5 * shot.view.size.as_vec2()).as_dvec3();
+            self.camera = Camera::new(shot.view.eye, direction);
+            self.playing = None;
+        }
+    }
+
+    /// What suits the land: the bearing and elevation of the sun (degrees).
+    pub fn own_sun(&self) -> Option<DVec2> {
+        let sun = self.shot.as_ref()?.sun;
+        Some(DVec2::new(sun.azimuth.to_degrees().rem_euclid(360.0), sun.elevation.to_degrees()))
+    }
+
+    /// Vertical angle of view (rad).
+    fn field(&self) -> f64 {
+        self.settings.field_degrees.to_radians()
+    }
+
+    /// What is seen in a picture of this size.
+    pub fn view(&self, size: UVec2) -> View {
+        self.camera.view(self.field(), size, 1.0)
+    }
+
+    /// The view that triangles are chosen for.
+    pub fn lod_view(&self, size: UVec2) -> View {
+        let view = self.frozen.unwrap_or_else(|| self.camera.view(self.field(), size, WIDER));
+        View { tolerance_pixels: self.settings.tolerance_pixels as f32, ..view }
+    }
+
+    /// What is wished for, in a picture of this size.
+    pub fn wish(&self, size: UVec2) -> Wish {
+        let settings = &self.settings;
+        let sun = (!settings.own_sun)
+            .then(|| Sun::new(settings.sun_azimuth_degrees.to_radians(), settings.sun_elevation_degrees.to_radians()));
+        let visibility = (settings.visibility_kilometres > 0.0).then_some(settings.visibility_kilometres * 1000.0);
+        Wish {
+            order: self.order.clone(),
+            look: Look { style: settings.style.picture(), sun, visibility },
+            sea: settings.waves.then(|| settings.sea.clone()),
+            method: settings.method,
+            triangles: settings.triangles as usize,
+            view: self.lod_view(size),
+            time: self.time,
+            probes: (self.camera.mode() == Mode::Boat).then(|| self.camera.boat.probes()),
+        }
+    }
+
+    /// Freezes the view that triangles are chosen for, or lets it follow the eye again.
+    pub fn freeze(&mut self, size: UVec2) {
+        self.frozen = match self.frozen {
+            Some(_) => None,
+            None => Some(self.lod_view(size)),
+        };
+    }
+
+    /// Asks the camera something about the land.
+    fn with_world<T>(&mut self, ask: impl FnOnce(&mut Camera, &World) -> T) -> Option<T> {
+        let subject = self.subject.clone()?;
+        let world = World {
+            ground: &|at| subject.ground(at),
+            water: &|at| subject.still_water(at),
+            bounds: subject.bounds(),
+            below: self.settings.below,
+        };
+        Some(ask(&mut self.camera, &world))
+    }
+
+    /// Another way of moving.
+    pub fn change_mode(&mut self, mode: Mode) {
+        let seen = self.subject.as_ref().and_then(|subject| {
+            let view = self.view(UVec2::new(16, 9));
+            subject.seen(&view, Vec2::new(8.0, 4.5))
+        });
+        match self.with_world(|camera, world| camera.change(mode, seen, world)) {
+            Some(Err(problem)) => self.note(problem),
+            Some(Ok(())) => {
+                self.playing = None;
+                self.settings.mode = mode;
+            }
+            None => self.settings.mode = mode,
+        }
+        if self.camera.mode() != self.settings.mode && self.subject.is_some() {
+            self.settings.mode = self.camera.mode();
+        }
+    }
+
+    /// Height of ground or still water (m) at a place.
+    pub fn surface(&self, at: DVec2) -> Option<f64> {
+        self.subject.as_ref()?.surface(at)
+    }
+
+    /// Goes on for `seconds`.
+    pub fn advance(&mut self, hands: &Hands, seconds: f64) {
+        self.clock += seconds;
+        self.notes.retain(|note| note.until > self.clock);
+        History::push(&mut self.history.frame, seconds * 1e3);
+        if !self.still {
+            self.time += seconds;
+        }
+        self.camera.speed = self.settings.speed;
+        self.retape();
+        match (self.playing, &self.tape) {
+            (Some(at), Some(tape)) => {
+                let at = if self.paused { at } else { at + seconds };
+                let pose = tape.pose(at);
+                self.camera.eye = pose.position;
+                self.camera.look_along(pose.direction);
+                let over = at > tape.duration() && !tape.closed;
+                self.playing = if over { None } else { Some(at) };
+            }
+            _ => {
+                self.with_world(|camera, world| camera.step(hands, seconds, world));
+            }
+        }
+    }
+
+    /// Follows the path with its tape.
+    fn retape(&mut self) {
+        let path = self.editor.path();
+        if self.taped.as_ref() == Some(path) {
+            return;
+        }
+        let Some(subject) = &self.subject else { return };
+        self.tape = Tape::of(path, subject, Tape::RATE).ok();
+        self.taped = Some(path.clone());
+        if self.tape.is_none() {
+            self.playing = None;
+        }
+    }
+
+    /// Flies along the path, or stops to.
+    pub fn play(&mut self) {
+        if self.playing.take().is_some() {
+            return;
+        }
+        let Some(subject) = &self.subject else { return };
+        match Tape::of(self.editor.path(), subject, Tape::RATE) {
+            Ok(_) => {
+                // A path carries the eye as a flight does.
+                if self.camera.mode() != Mode::Fly {
+                    self.change_mode(Mode::Fly);
+                }
+                (self.playing, self.paused) = (Some(0.0), false);
+            }
+            Err(problem) => self.note(format!("no flight yet: {problem}")),
+        }
+    }
+
+    /// A path once round the land.
+    pub fn round_trip(&mut self) {
+        let Some(subject) = &self.subject else { return };
+        let land = &subject.land;
+        let mut path = FlightPath::around(land.origin(), land.extent(), land.height_range(), 40.0);
+        path.pace = Pace::Duration(40.0);
+        self.editor.replace(path);
+    }
+
+    /// Saves the path under its name.
+    pub fn save_path(&mut self) {
+        let Some(subject) = &self.subject else { return };
+        let file = self.path_file.trim().to_owned();
+        let said = match file.is_empty() {
+            true => "expected a name for the path's file, got none; type one".to_owned(),
+            false => match subject.save_path(self.editor.path(), Path::new(&file)) {
+                Ok(()) => format!("path of {} points saved in {file}", self.editor.path().points.len()),
+                Err(problem) => problem,
+            },
+        };
+        self.note(said);
+    }
+
+    /// Loads a path.
+    pub fn load_path(&mut self, file: &Path) {
+        let Some(subject) = &self.subject else { return };
+        match subject.load_path(file) {
+            Ok(path) => {
+                self.note(format!("path of {} points loaded from {}", path.points.len(), file.display()));
+                self.editor.replace(path);
+                self.path_file = file.display().to_string();
+            }
+            Err(problem) => self.note(problem),
+        }
+    }
+
+    /// Takes files that were dropped: paths are loaded, everything else is opened as land.
+    pub fn drop_files(&mut self, files: Vec<PathBuf>) {
+        let is_path = |file: &PathBuf| file.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        let (paths, land): (Vec<_>, Vec<_>) = files.into_iter().partition(is_path);
+        if !land.is_empty() {
+            self.open(land);
+        }
+        if let Some(path) = paths.last() {
+            self.load_path(path);
+        }
+    }
+
+    /// Opens files as one land.
+    pub fn open(&mut self, files: Vec<PathBuf>) {
+        self.order.files = files;
+        self.working = Some(("opening".to_owned(), 0.0));
+    }
+}

@@ -1,0 +1,391 @@
+//! The thread that chooses triangles, so that the window never waits for them.
+//!
+//! The window says what it wishes for as often as it likes; only the newest wish counts. The scene thread answers with finished meshes, and with
+//! news of what it loads. Files are read and seas are made on threads of their own meanwhile, over which the old scene goes on.
+//!
+//! Everything that borrows the land (the stage, the sea's method, ROAM's bounds) lives on the stack of [`fly`], for as long as that land is flown over.
+
+use crate::chooser::Chooser;
+use crate::settings::Method;
+use crate::subject::{Order, Subject};
+use glam::DVec2;
+use littoral::field::Sea;
+use littoral::lod::{Mesh, NestedBounds};
+use littoral::picture::{self, Air, Border, Climate, Scene, Shot, Stage, Sun};
+use littoral::space::{Datum, View};
+use littoral::waves::SeaState;
+use littoral_gpu::Gpu;
+use std::cell::OnceCell;
+use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What decides the light and the colours: each change makes the stage anew.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// The style; `None` for what suits the land.
+    pub style: Option<picture::Style>,
+    /// The sun; `None` for one that suits the land.
+    pub sun: Option<Sun>,
+    /// How far one sees (m); `None` for what suits the land.
+    pub visibility: Option<f64>,
+}
+
+/// What the window wishes to see.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wish {
+    /// Over which land.
+    pub order: Order,
+    /// In which light.
+    pub look: Look,
+    /// The sea's state as typed; `None` for still water.
+    pub sea: Option<String>,
+    /// How triangles are chosen.
+    pub method: Method,
+    /// The most of them, of the ground and of the sea.
+    pub triangles: usize,
+    /// For which view, with its tolerance.
+    pub view: View,
+    /// The instant of the sea (s).
+    pub time: f64,
+    /// Where the water's height is asked for.
+    pub probes: Option<[DVec2; 4]>,
+}
+
+/// Meshes for a wish.
+#[derive(Debug)]
+pub struct Frame {
+    /// Which land they are of.
+    pub serial: u64,
+    /// The view they were chosen for.
+    pub view: View,
+    /// The instant of the sea (s).
+    pub time: f64,
+    /// The ground.
+    pub ground: Mesh,
+    /// The water.
+    pub water: Option<Mesh>,
+    /// No sample that is seen is farther from its place than this (pixels).
+    pub bound_pixels: f32,
+    /// Whether the number of triangles, not the tolerance, ended the refinement.
+    pub limited: bool,
+    /// How long the choice took (ms).
+    pub milliseconds: f64,
+    /// Heights of the water (m) at the wish's probes.
+    pub heights: Option<[f64; 4]>,
+}
+
+impl Frame {
+    /// Triangles of ground and water.
+    pub fn triangles(&self) -> usize {
+        self.ground.triangles.len() + self.water.as_ref().map_or(0, |water| water.triangles.len())
+    }
+}
+
+/// What the scene tells the window.
+pub enum News {
+    /// Something is being done, and this much of it is done, in [0, 1].
+    Working(String, f32),
+    /// Nothing is being done any more.
+    Idle,
+    /// Something that shall be read.
+    Note(String),
+    /// What was ordered could not be opened.
+    Refused(String),
+    /// Another land, and a good view of it.
+    Arrived(Arc<Subject>, Box<Shot>, u64),
+    /// The light and the colours of a land.
+    Scenery(Arc<crate::draw::Scenery>, u64),
+    /// Meshes.
+    Frame(Box<Frame>),
+}
+
+/// Where the newest wish lies.
+#[derive(Default)]
+pub struct Slot {
+    newest: Mutex<(Option<Wish>, bool)>,
+    changed: Condvar,
+}
+
+impl Slot {
+    /// Puts a wish in the place of the one before.
+    pub fn wish(&self, wish: Wish) {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner).0 = Some(wish);
+        self.changed.notify_one();
+    }
+
+    /// Ends the scene.
+    pub fn end(&self) {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner).1 = true;
+        self.changed.notify_one();
+    }
+
+    /// The newest wish, if one comes within a time; an error at the end.
+    fn wait(&self, most: Duration) -> Result<Option<Wish>, Ended> {
+        let newest = self.newest.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited = self.changed.wait_timeout_while(newest, most, |(wish, end)| wish.is_none() && !*end);
+        let mut newest = waited.unwrap_or_else(PoisonError::into_inner).0;
+        if newest.1 { Err(Ended) } else { Ok(newest.0.take()) }
+    }
+}
+
+/// The window is gone.
+struct Ended;
+
+/// What the scene thread speaks with.
+#[derive(Clone)]
+pub struct Voice {
+    news: Sender<News>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+    told: Arc<AtomicI32>,
+}
+
+impl Voice {
+    /// News go to the window, which is woken for them.
+    pub fn new(news: Sender<News>, wake: impl Fn() + Send + Sync + 'static) -> Voice {
+        Voice { news, wake: Arc::new(wake), told: Arc::new(AtomicI32::new(-1)) }
+    }
+
+    fn tell(&self, news: News) {
+        let _ = self.news.send(news); // a window that is gone wants no news
+        (self.wake)();
+    }
+
+    /// Each percent once.
+    fn working(&self, what: &str, done: f32) {
+        let percent = (done.clamp(0.0, 1.0) * 100.0) as i32;
+        if self.told.swap(percent, Ordering::Relaxed) != percent {
+            self.tell(News::Working(what.to_owned(), done));
+        }
+    }
+
+    fn idle(&self) {
+        self.told.store(-1, Ordering::Relaxed);
+        self.tell(News::Idle);
+    }
+}
+
+/// How often a scene without wishes looks whether what it waits for is done.
+const NAP: Duration = Duration::from_millis(40);
+
+/// The scene thread: until the window ends it.
+pub fn run(slot: &Slot, voice: &Voice, gpu: &Gpu) {
+    let mut wish = loop {
+        match slot.wait(NAP) {
+            Ok(Some(wish)) => break wish,
+            Ok(None) => {}
+            Err(Ended) => return,
+        }
+    };
+    let mut serial = 0;
+    let mut opening = Opening::of(&wish.order, voice);
+    let mut subject: Option<(Arc<Subject>, Shot)> = None;
+    loop {
+        let done = match &subject {
+            // Nothing to fly over yet.
+            None => match slot.wait(NAP) {
+                Ok(newest) => {
+                    wish = newest.unwrap_or(wish);
+                    opening.follow(&wish.order, None, voice);
+                    opening.take()
+                }
+                Err(Ended) => return,
+            },
+            Some((subject, suits)) => match fly(subject, suits, serial, &mut wish, &mut opening, slot, voice, gpu) {
+                Ok(opened) => Some(opened),
+                Err(Ended) => return,
+            },
+        };
+        match done {
+            Some(Ok(opened)) => {
+                serial += 1;
+                voice.working("looking for a good view", 0.0);
+                let shot = match opened.order.files.is_empty() {
+                    true => picture::coast_shot(wish.view.size),
+                    false => picture::compose(&opened.land, opened.water.as_ref(), wish.view.size),
+                };
+                let opened = Arc::new(opened);
+                subject = Some((opened.clone(), shot));
+                voice.tell(News::Arrived(opened, Box::new(shot), serial));
+            }
+            Some(Err(problem)) => {
+                voice.idle();
+                voice.tell(News::Refused(problem));
+            }
+            None => {}
+        }
+    }
+}
+
+/// A land that is being opened.
+struct Opening {
+    order: Order,
+    thread: Option<std::thread::JoinHandle<Result<Subject, String>>>,
+}
+
+impl Opening {
+    fn of(order: &Order, voice: &Voice) -> Opening {
+        let (ordered, voice) = (order.clone(), voice.clone());
+        let work = move || Subject::open(&ordered, &|what, done| voice.working(what, done));
+        let thread = std::thread::Builder::new().name("opening".into()).spawn(work).ok();
+        Opening { order: order.clone(), thread }
+    }
+
+    /// Opens another land if another one is wanted than is there.
+    fn follow(&mut self, order: &Order, there: Option<&Order>, voice: &Voice) {
+        if Some(order) == there {
+            *self = Opening { order: order.clone(), thread: None };
+        } else if self.order != *order {
+            *self = Opening::of(order, voice);
+        }
+    }
+
+    /// What was opened, once.
+    fn take(&mut self) -> Option<Result<Subject, String>> {
+        let thread = self.thread.take_if(|thread| thread.is_finished())?;
+        let name = littoral_data::name_of_all(&self.order.files);
+        let broken = || format!("{}: could not be opened (an internal error; please report it)", name.display());
+        Some(thread.join().unwrap_or_else(|_| Err(broken())))
+    }
+}
+
+/// Flies over a land until another one is open. `suits` is a view with the light that suits it.
+fn fly(
+    subject: &Subject,
+    suits: &Shot,
+    serial: u64,
+    wish: &mut Wish,
+    opening: &mut Opening,
+    slot: &Slot,
+    voice: &Voice,
+    gpu: &Gpu,
+) -> Result<Result<Subject, String>, Ended> {
+    std::thread::scope(|threads| {
+        let mut waves: Option<Sea> = None;
+        // What the waves are of, and what is being made.
+        let mut state: Option<String> = None;
+        let mut making: Option<std::thread::ScopedJoinHandle<'_, Result<Sea, String>>> = None;
+        loop {
+            let look = wish.look;
+            let scene = scene(subject, suits, &look);
+            voice.working("lighting the land", 0.0);
+            let stage = Stage::new(&scene);
+            let scenery = crate::draw::Scenery::new(gpu, &stage);
+            voice.tell(News::Scenery(Arc::new(scenery), serial));
+            voice.idle();
+            let bounds: OnceCell<Option<NestedBounds>> = OnceCell::new();
+            let mut still = subject.water.as_ref().map(|water| {
+                let (origin, size) = (subject.land.origin(), subject.land.extent());
+                Sea::new(Datum::Plane { origin, size }, water.level)
+            });
+            let mut chooser = Chooser::new(stage.land(), &bounds, wish.method, wish.triangles);
+            let mut answered: Option<Wish> = None;
+            loop {
+                if wish.look != look {
+                    break;
+                }
+                opening.follow(&wish.order, Some(&subject.order), voice);
+                if let Some(done) = opening.take() {
+                    if done.is_ok() {
+                        return Ok(done);
+                    }
+                    voice.idle();
+                    voice.tell(News::Refused(done.err().unwrap_or_default()));
+                }
+                if making.is_none() && wish.sea != state {
+                    state.clone_from(&wish.sea);
+                    waves = waves.filter(|_| state.is_some());
+                    if let (Some(text), Some(_)) = (state.clone(), &subject.water) {
+                        let voice = voice.clone();
+                        making = Some(threads.spawn(move || sea(subject, &text, &voice)));
+                    }
+                }
+                if let Some(made) = making.take_if(|making| making.is_finished()) {
+                    voice.idle();
+                    match made.join() {
+                        Ok(Ok(sea)) => waves = Some(sea),
+                        Ok(Err(problem)) => voice.tell(News::Note(problem)),
+                        Err(_) => voice.tell(News::Note("the waves could not be made (an internal error; please report it)".into())),
+                    }
+                    answered = None;
+                }
+                if answered.as_ref() != Some(&*wish) {
+                    chooser.follow(wish.method, wish.triangles);
+                    let sea = waves.as_mut().or(still.as_mut()).filter(|_| stage.shows_waves());
+                    match frame(&mut chooser, sea, wish, serial) {
+                        Ok(frame) => voice.tell(News::Frame(Box::new(frame))),
+                        Err(problem) => voice.tell(News::Note(problem)),
+                    }
+                    answered = Some(wish.clone());
+                }
+                if let Some(newest) = slot.wait(NAP)? {
+                    *wish = newest;
+                }
+            }
+        }
+    })
+}
+
+/// The scene of a land in a light.
+fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
+    let style = look.style.unwrap_or(suits.style);
+    let air = match look.visibility {
+        Some(visibility) => Air { visibility, veils_distance: true },
+        None => suits.air,
+    };
+    let climate = subject.latitude().map_or_else(Climate::default, Climate::at_latitude);
+    Scene {
+        lakes: subject.lakes.as_ref(),
+        sun: look.sun.unwrap_or(suits.sun),
+        air,
+        style,
+        // Whoever flies comes within, sooner or later.
+        border: Border::Mist,
+        climate,
+        north: subject.north(),
+        ..Scene::new(&subject.land, subject.water.as_ref())
+    }
+}
+
+/// The sea of a state as typed.
+fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Sea, String> {
+    let wrong = |problem: String| format!("sea state \"{text}\": {problem}; correct it, for example: beaufort=4,from=225");
+    let state: SeaState = text.parse().map_err(|e: littoral::waves::spec::SpecError| wrong(e.to_string()))?;
+    let Some(water) = &subject.water else { return Err("there is no water here for waves".into()) };
+    // Bearings count from true north, headings from the land's x axis.
+    let state = state.turned(-subject.north());
+    let told = |done: f64| {
+        voice.working("carrying the waves over the bed", done as f32);
+        true
+    };
+    Sea::over(&subject.land, water, &state, &told).map_err(|e| wrong(e.to_string()))
+}
+
+/// The meshes that are wished for.
+fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish, serial: u64) -> Result<Frame, String> {
+    let started = Instant::now();
+    let sea = sea.map(|sea| {
+        if sea.time() != wish.time {
+            sea.set_time(wish.time);
+        }
+        &*sea
+    });
+    let chosen = chooser.choose(sea, &wish.view).map_err(|e| e.to_string())?;
+    let heights = sea.zip(wish.probes).map(|(sea, probes)| {
+        let mut heights = [0.0; 4];
+        sea.heights_at(&probes, &mut heights);
+        heights
+    });
+    Ok(Frame {
+        serial,
+        view: wish.view,
+        time: wish.time,
+        ground: chosen.ground,
+        water: chosen.water,
+        bound_pixels: chosen.reached.pixels,
+        limited: chosen.reached.limited,
+        milliseconds: started.elapsed().as_secs_f64() * 1e3,
+        heights,
+    })
+}

@@ -1,0 +1,305 @@
+//! What is remembered from one flight to the next: a readable file in the user's folder for settings.
+
+use crate::camera::Mode;
+use littoral::lod::{Limits, Lod, Nested, Patches, Quadtree, Roam, Strips, Whole};
+use littoral::picture;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A method of detail.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Everything equally fine.
+    Whole,
+    /// Nested square windows.
+    Nested,
+    /// A restricted quadtree whose patches morph.
+    #[default]
+    Quadtree,
+    /// Triangles cut level by level.
+    Patches,
+    /// Strips along rows.
+    Strips,
+    /// A bintree of right triangles, which goes on from frame to frame.
+    Roam,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Method; 6] =
+        [Method::Whole, Method::Nested, Method::Quadtree, Method::Patches, Method::Strips, Method::Roam];
+
+    /// What it is called, and what it does.
+    pub fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Method::Whole => ("Whole", "Everything equally fine: what the others are measured by"),
+            Method::Nested => ("Nested", "Square windows within each other, joined by upright strips: for seas"),
+            Method::Quadtree => ("Quadtree", "A restricted quadtree whose patches morph"),
+            Method::Patches => ("Patches", "Triangles cut level by level, edges deciding"),
+            Method::Strips => ("Strips", "Strips along rows whose cells change size on the way"),
+            Method::Roam => ("ROAM", "A bintree of right triangles, the worst split first; it goes on from frame to frame"),
+        }
+    }
+
+    /// The method within limits.
+    pub fn within(self, limits: Limits) -> Box<dyn Lod> {
+        match self {
+            Method::Whole => Box::new(Whole::new(limits)),
+            Method::Nested => Box::new(Nested::new(limits)),
+            Method::Quadtree => Box::new(Quadtree::new(limits)),
+            Method::Patches => Box::new(Patches::new(limits)),
+            Method::Strips => Box::new(Strips::new(limits)),
+            Method::Roam => Box::new(Roam::new(limits)),
+        }
+    }
+}
+
+/// How the ground is coloured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Style {
+    /// What suits the land.
+    #[default]
+    Own,
+    /// Rock, scree, grass, woods, sand and snow.
+    Natural,
+    /// Colours by height.
+    Tint,
+    /// A cartographer's shaded relief.
+    Relief,
+}
+
+impl Style {
+    /// All of them.
+    pub const ALL: [Style; 4] = [Style::Own, Style::Natural, Style::Tint, Style::Relief];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Style::Own => "By itself",
+            Style::Natural => "Natural",
+            Style::Tint => "Tint",
+            Style::Relief => "Relief",
+        }
+    }
+
+    /// The picture's style, if one is named.
+    pub fn picture(self) -> Option<picture::Style> {
+        match self {
+            Style::Own => None,
+            Style::Natural => Some(picture::Style::Natural),
+            Style::Tint => Some(picture::Style::Tint),
+            Style::Relief => Some(picture::Style::Relief),
+        }
+    }
+}
+
+/// What is seen of the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Show {
+    /// The surface, lit.
+    #[default]
+    Textured,
+    /// Its triangles' edges alone.
+    Wireframe,
+    /// Both.
+    Both,
+}
+
+impl Show {
+    /// All of them.
+    pub const ALL: [Show; 3] = [Show::Textured, Show::Wireframe, Show::Both];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Show::Textured => "Textured",
+            Show::Wireframe => "Wireframe",
+            Show::Both => "Both",
+        }
+    }
+}
+
+/// All that is remembered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// Of the file's format.
+    pub version: u32,
+    /// How triangles are chosen.
+    pub method: Method,
+    /// How far from its place the mesh may be drawn (pixels).
+    pub tolerance_pixels: f64,
+    /// The most triangles of the ground, and as many of the sea.
+    pub triangles: u32,
+    /// How the ground is coloured.
+    pub style: Style,
+    /// Textured, wireframe or both.
+    pub show: Show,
+    /// Whether the sun stands where it suits the land, and not where it was put.
+    pub own_sun: bool,
+    /// Bearing of the sun (degrees, clockwise from north).
+    pub sun_azimuth_degrees: f64,
+    /// Its elevation (degrees).
+    pub sun_elevation_degrees: f64,
+    /// How far one sees (km); 0 for what suits the land.
+    pub visibility_kilometres: f64,
+    /// The sea's state, as it is typed.
+    pub sea: String,
+    /// Whether there are waves at all.
+    pub waves: bool,
+    /// By how much heights are stretched.
+    pub exaggeration: f64,
+    /// Multiplies all speeds.
+    pub speed: f64,
+    /// Vertical angle of view (degrees).
+    pub field_degrees: f64,
+    /// What carries the eye.
+    pub mode: Mode,
+    /// Whether the eye may go below the surface.
+    pub below: bool,
+    /// Whether the panel is open.
+    pub panel: bool,
+}
+
+/// The newest version of the file.
+const VERSION: u32 = 1;
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            version: VERSION,
+            method: Method::default(),
+            tolerance_pixels: 1.0,
+            triangles: 500_000,
+            style: Style::default(),
+            show: Show::default(),
+            own_sun: true,
+            sun_azimuth_degrees: 240.0,
+            sun_elevation_degrees: 25.0,
+            visibility_kilometres: 0.0,
+            sea: "beaufort=4,from=225".to_owned(),
+            waves: true,
+            exaggeration: 1.0,
+            speed: 1.0,
+            field_degrees: 45.0,
+            mode: Mode::Fly,
+            below: false,
+            panel: true,
+        }
+    }
+}
+
+impl Settings {
+    /// Where they are kept, if the user has a place for such.
+    pub fn file() -> Option<PathBuf> {
+        Some(directories::ProjectDirs::from("", "", "littoral")?.config_dir().join("fly.toml"))
+    }
+
+    /// The settings of a file, and what is to be said about it. A file that is not there says nothing; one that is broken, or of a newer version, gives
+    /// the defaults.
+    pub fn load(file: &Path) -> (Settings, Option<String>) {
+        let complaint = |problem: String| {
+            let message = format!("{}: {problem}; the usual settings are taken", file.display());
+            (Settings::default(), Some(message))
+        };
+        let text = match std::fs::read_to_string(file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return (Settings::default(), None),
+            Err(error) => return complaint(format!("expected a readable file of settings, got \"{error}\"")),
+        };
+        match toml::from_str::<Settings>(&text) {
+            Ok(settings) if settings.version == VERSION => settings.sound(file),
+            Ok(settings) => complaint(format!("expected version {VERSION} of the settings, got {}", settings.version)),
+            Err(error) => {
+                let what = error.message().lines().next().unwrap_or_default().to_owned();
+                complaint(format!("expected settings, got an error: {what}"))
+            }
+        }
+    }
+
+    /// With what is out of range put right.
+    fn sound(mut self, file: &Path) -> (Settings, Option<String>) {
+        let mut wrong = Vec::new();
+        let usual = Settings::default();
+        let mut number = |name: &'static str, value: &mut f64, usual: f64, low: f64, high: f64| {
+            if !(low..=high).contains(value) {
+                *value = usual;
+                wrong.push(name);
+            }
+        };
+        number("tolerance_pixels", &mut self.tolerance_pixels, usual.tolerance_pixels, 0.05, 100.0);
+        number("sun_azimuth_degrees", &mut self.sun_azimuth_degrees, usual.sun_azimuth_degrees, 0.0, 360.0);
+        number("sun_elevation_degrees", &mut self.sun_elevation_degrees, usual.sun_elevation_degrees, -90.0, 90.0);
+        number("visibility_kilometres", &mut self.visibility_kilometres, usual.visibility_kilometres, 0.0, 1000.0);
+        number("exaggeration", &mut self.exaggeration, usual.exaggeration, 0.01, 1000.0);
+        number("speed", &mut self.speed, usual.speed, 0.01, 100.0);
+        number("field_degrees", &mut self.field_degrees, usual.field_degrees, 5.0, 120.0);
+        if !(1000..=20_000_000).contains(&self.triangles) {
+            self.triangles = usual.triangles;
+            wrong.push("triangles");
+        }
+        let message = (!wrong.is_empty())
+            .then(|| format!("{}: {} out of range; the usual taken", file.display(), wrong.join(", ")));
+        (self, message)
+    }
+
+    /// Saves them, whole or not at all.
+    pub fn save(&self, file: &Path) -> Result<(), String> {
+        let problem = |e: &dyn std::fmt::Display| format!("the settings could not be saved: {e}");
+        if let Some(folder) = file.parent() {
+            std::fs::create_dir_all(folder).map_err(|e| problem(&e))?;
+        }
+        let text = toml::to_string(self).map_err(|e| problem(&e))?;
+        littoral_data::write::whole(file, |sink| sink.write_all(text.as_bytes())).map_err(|e| problem(&e))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_come_back_as_they_were() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("deep/fly.toml");
+        assert_eq!(Settings::load(&file), (Settings::default(), None), "none yet, nothing to say");
+        let settings = Settings {
+            method: Method::Roam,
+            show: Show::Both,
+            style: Style::Tint,
+            sea: "wind=14,from=300".into(),
+            exaggeration: 2.5,
+            mode: Mode::Boat,
+            ..Settings::default()
+        };
+        settings.save(&file).expect("saved");
+        assert_eq!(Settings::load(&file), (settings, None));
+    }
+
+    #[test]
+    fn broken_settings_are_the_usual_ones_and_said_so() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("fly.toml");
+        let load = |text: &[u8]| {
+            std::fs::write(&file, text).expect("written");
+            Settings::load(&file)
+        };
+        for text in
+            [&b"version = 99"[..], b"metod = \"roam\"", b"method = \"rome\"", b"speed = \"fast\"", b"\xff\xfe", b"= ="]
+        {
+            let (settings, message) = load(text);
+            assert_eq!(settings, Settings::default());
+            let message = message.expect("a message");
+            assert!(message.contains("fly.toml") && message.contains("expected"), "{message}");
+            assert!(!message.contains('\n'), "{message}");
+        }
+        // What is missing has its usual value, what is out of range too.
+        let (settings, message) = load(b"method = \"strips\"\nspeed = nan\ntriangles = 5\nfield_degrees = 60");
+        assert_eq!(settings, Settings { method: Method::Strips, field_degrees: 60.0, ..Settings::default() });
+        assert!(message.is_some_and(|m| m.contains("speed, triangles")));
+        assert_eq!(load(b""), (Settings::default(), None));
+    }
+}

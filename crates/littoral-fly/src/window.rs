@@ -1,0 +1,571 @@
+//! The window: events in, pictures out. It never waits for the scene.
+
+use crate::Arguments;
+use crate::cockpit::{Cockpit, median};
+use crate::film::Filming;
+use crate::keys;
+use crate::paint::{Gui, Missed, Paint};
+use crate::panel::{self, Ask, Shown};
+use crate::scene::{self, News, Slot, Voice};
+use crate::settings::Settings;
+use glam::{DVec2, UVec2, Vec2};
+use littoral_data::write::{PngPixels, png};
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
+use winit::keyboard::{KeyCode, PhysicalKey};
+use winit::window::{Window, WindowId};
+
+/// Opens the window and flies until it is closed.
+pub fn run(arguments: Arguments, settings: Settings, note: Option<String>) -> Result<(), String> {
+    let no_display = |e: &dyn std::fmt::Display| {
+        let what = e.to_string().replace('\n', " ");
+        format!(
+            "expected a display to open a window on, found none ({what}); start it in a desktop session, set DISPLAY or WAYLAND_DISPLAY, or draw without a window: littoral render"
+        )
+    };
+    let events = EventLoop::<()>::with_user_event().build().map_err(|e| no_display(&e))?;
+    events.set_control_flow(ControlFlow::Wait);
+    let mut app = App { arguments, settings, note, wake: events.create_proxy(), flight: None, problem: None };
+    events.run_app(&mut app).map_err(|e| no_display(&e))?;
+    match app.problem {
+        Some(problem) => Err(problem),
+        None => Ok(()),
+    }
+}
+
+struct App {
+    arguments: Arguments,
+    settings: Settings,
+    note: Option<String>,
+    wake: EventLoopProxy<()>,
+    flight: Option<Flight>,
+    problem: Option<String>,
+}
+
+/// A flight in a window.
+struct Flight {
+    window: Arc<Window>,
+    paint: Paint,
+    egui: egui_winit::State,
+    cockpit: Cockpit,
+    shown: Shown,
+    news: Receiver<News>,
+    slot: Arc<Slot>,
+    scene: Option<JoinHandle<()>>,
+    /// What the graphics driver complained of since the last frame.
+    complaints: Arc<Mutex<Vec<String>>>,
+    lost: Arc<AtomicBool>,
+    held: HashSet<KeyCode>,
+    cursor: Vec2,
+    /// The mouse button that turns the look.
+    looking: Option<MouseButton>,
+    /// The point of the path that is dragged.
+    dragged: Option<usize>,
+    dropped: Vec<PathBuf>,
+    filming: Option<Filming>,
+    pictures: Vec<bool>,
+    before: Instant,
+    /// The path to be flown as soon as there is a land.
+    path: Option<PathBuf>,
+    smoke: Option<Smoke>,
+}
+
+/// A flight that ends after some frames and tells its times.
+struct Smoke {
+    frames: u32,
+    milliseconds: Vec<f32>,
+    method: Vec<f32>,
+    triangles: Vec<f32>,
+    bound: Vec<f32>,
+    /// When it gives up waiting for a first frame.
+    begun: Instant,
+}
+
+#[derive(serde::Serialize)]
+struct Answer {
+    frames: u32,
+    width: u32,
+    height: u32,
+    method: &'static str,
+    frame_ms: f32,
+    method_ms: f32,
+    triangles: f32,
+    bound_pixels: f32,
+    adapter: String,
+}
+
+impl Flight {
+    fn new(events: &ActiveEventLoop, app: &mut App) -> Result<Flight, String> {
+        let arguments = &app.arguments;
+        let size = PhysicalSize::new(arguments.size.x, arguments.size.y);
+        let attributes = Window::default_attributes().with_title("Littoral").with_inner_size(size);
+        let window = events.create_window(attributes).map_err(|e| {
+            format!("expected to open a window, got an error: {e}; try another --size, or littoral render")
+        })?;
+        let window = Arc::new(window);
+        let paint = Paint::new(&window, arguments.smoke.is_some())?;
+        let complaints = Arc::new(Mutex::new(Vec::new()));
+        let lost = Arc::new(AtomicBool::new(false));
+        {
+            let (complaints, lost) = (complaints.clone(), lost.clone());
+            paint.gpu.device.on_uncaptured_error(Arc::new(move |error| {
+                let text = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+                complaints.lock().unwrap_or_else(PoisonError::into_inner).push(text);
+            }));
+            paint.gpu.device.set_device_lost_callback(move |_, _| lost.store(true, Ordering::Relaxed));
+        }
+        let context = egui::Context::default();
+        context.set_theme(egui::Theme::Dark);
+        let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &window, None, None, None);
+        let mut cockpit = Cockpit::new(app.settings.clone(), arguments.files.clone());
+        if let Some(note) = app.note.take() {
+            cockpit.note(note);
+        }
+        let (sender, news) = channel();
+        let slot = Arc::new(Slot::default());
+        let wake = app.wake.clone();
+        let voice = Voice::new(sender, move || {
+            let _ = wake.send_event(()); // a window that is gone needs no waking
+        });
+        let (its, gpu) = (slot.clone(), paint.gpu.clone());
+        let scene = std::thread::Builder::new()
+            .name("scene".into())
+            .spawn(move || scene::run(&its, &voice, &gpu))
+            .map_err(|e| format!("expected to start a thread, got an error: {e}; close other programs"))?;
+        let adapter = format!("{} ({})", paint.gpu.adapter.name, paint.gpu.adapter.backend);
+        let smoke = arguments.smoke.map(|frames| Smoke {
+            frames,
+            milliseconds: Vec::new(),
+            method: Vec::new(),
+            triangles: Vec::new(),
+            bound: Vec::new(),
+            begun: Instant::now(),
+        });
+        Ok(Flight {
+            window,
+            paint,
+            egui,
+            cockpit,
+            shown: Shown { adapter, ..Shown::default() },
+            news,
+            slot,
+            scene: Some(scene),
+            complaints,
+            lost,
+            held: HashSet::new(),
+            cursor: Vec2::ZERO,
+            looking: None,
+            dragged: None,
+            dropped: Vec::new(),
+            filming: None,
+            pictures: Vec::new(),
+            before: Instant::now(),
+            path: arguments.path.clone(),
+            smoke,
+        })
+    }
+
+    /// One frame. An error ends the program.
+    fn frame(&mut self, events: &ActiveEventLoop) -> Result<(), String> {
+        if self.lost.load(Ordering::Relaxed) {
+            return Err("the graphics device was lost (driver restarted or unplugged?); start again".into());
+        }
+        let complaints = std::mem::take(&mut *self.complaints.lock().unwrap_or_else(PoisonError::into_inner));
+        complaints.into_iter().for_each(|text| self.cockpit.note(format!("graphics: {text}")));
+        let now = Instant::now();
+        let passed = now.duration_since(self.before).as_secs_f64();
+        self.before = now;
+        self.listen();
+        if !self.dropped.is_empty() {
+            let files = std::mem::take(&mut self.dropped);
+            self.cockpit.drop_files(files);
+        }
+        let size = self.paint.size();
+        let hands = match &self.smoke {
+            // Always the same way, whatever the clock says.
+            Some(_) => crate::camera::Hands { forward: 0.3, turn: 0.3, ..Default::default() },
+            None => keys::hands(&self.held),
+        };
+        match &mut self.filming {
+            Some(filming) => filming.pose(&mut self.cockpit),
+            None if self.smoke.is_some() => self.cockpit.advance(&hands, 1.0 / 60.0),
+            None => self.cockpit.advance(&hands, passed),
+        }
+        let mut gui = self.gui(size);
+        self.paint.take_textures(&mut gui);
+        self.slot.wish(self.cockpit.wish(size));
+        match self.paint.show(&self.cockpit, &gui) {
+            Ok(()) => self.count(passed, events)?,
+            Err(Missed::Frame) => std::thread::sleep(std::time::Duration::from_millis(5)),
+            Err(Missed::Lost(problem)) => return Err(problem),
+        }
+        for panel in std::mem::take(&mut self.pictures) {
+            self.picture(panel.then_some(&gui));
+        }
+        self.film();
+        Ok(())
+    }
+
+    /// Takes what the scene told.
+    fn listen(&mut self) {
+        while let Ok(news) = self.news.try_recv() {
+            let arrived = matches!(news, News::Arrived(..));
+            self.cockpit.hear(news);
+            if arrived {
+                let name = self.cockpit.subject.as_ref().map_or("", |subject| &subject.name);
+                self.window.set_title(&format!("Littoral: {name}"));
+                if let Some(path) = self.path.take() {
+                    self.cockpit.load_path(&path);
+                    self.cockpit.play();
+                }
+            }
+        }
+        if self.scene.as_ref().is_some_and(JoinHandle::is_finished) {
+            self.scene = None;
+            self.cockpit.working = None;
+            self.cockpit.note("the scene stopped (an internal error; please report it): save your path, and start again");
+        }
+    }
+
+    /// Runs the panel.
+    fn gui(&mut self, size: UVec2) -> Gui {
+        let mut asks = Vec::new();
+        let input = self.egui.take_egui_input(&self.window);
+        let context = self.egui.egui_ctx().clone();
+        let (cockpit, shown) = (&mut self.cockpit, &mut self.shown);
+        let output = context.run_ui(input, |ui| panel::show(ui, cockpit, shown, size, &mut asks));
+        self.egui.handle_platform_output(&self.window, output.platform_output);
+        for ask in asks {
+            match ask {
+                Ask::Picture => self.pictures.push(false),
+                Ask::Film => self.toggle_film(),
+                Ask::Freeze => self.cockpit.freeze(size),
+            }
+        }
+        let scale = output.pixels_per_point;
+        Gui { primitives: context.tessellate(output.shapes, scale), textures: output.textures_delta, scale }
+    }
+
+    /// Counts a frame of a smoke flight, and ends it after the last.
+    fn count(&mut self, passed: f64, events: &ActiveEventLoop) -> Result<(), String> {
+        let Some(smoke) = &mut self.smoke else { return Ok(()) };
+        let (Some(frame), Some(_)) = (&self.cockpit.frame, &self.cockpit.scenery) else {
+            const PATIENCE: u64 = 300;
+            return match smoke.begun.elapsed().as_secs() > PATIENCE {
+                true => Err(format!("expected a first picture within {PATIENCE} s, got none; try a smaller file")),
+                false => Ok(()),
+            };
+        };
+        smoke.milliseconds.push((passed * 1e3) as f32);
+        smoke.method.push(frame.milliseconds as f32);
+        smoke.triangles.push(frame.triangles() as f32);
+        smoke.bound.push(frame.bound_pixels);
+        if smoke.milliseconds.len() as u32 >= smoke.frames {
+            let size = self.paint.size();
+            let answer = Answer {
+                frames: smoke.frames,
+                width: size.x,
+                height: size.y,
+                method: self.cockpit.settings.method.words().0,
+                frame_ms: median(smoke.milliseconds.iter().copied()),
+                method_ms: median(smoke.method.iter().copied()),
+                triangles: median(smoke.triangles.iter().copied()),
+                bound_pixels: median(smoke.bound.iter().copied()),
+                adapter: self.shown.adapter.clone(),
+            };
+            println!("{}", serde_json::to_string(&answer).map_err(|e| e.to_string())?);
+            events.exit();
+        }
+        Ok(())
+    }
+
+    /// Saves what is seen under the first name that is free.
+    fn picture(&mut self, gui: Option<&Gui>) {
+        let free = (1..100_000).map(|i| PathBuf::from(format!("littoral-{i}.png"))).find(|file| !file.exists());
+        let Some(file) = free else { return };
+        let size = self.paint.size();
+        let name = self.cockpit.subject.as_ref().map_or(String::new(), |subject| subject.name.clone());
+        let notes = [("Software", "littoral-fly".to_owned()), ("Source", name)];
+        let saved = self.paint.copy(&self.cockpit, gui).and_then(|pixels| {
+            png(&file, size.x, size.y, PngPixels::Rgb8(&pixels), &notes).map_err(|e| e.to_string())
+        });
+        self.cockpit.note(match saved {
+            Ok(()) => format!("picture saved in {}", file.display()),
+            Err(problem) => problem,
+        });
+    }
+
+    fn toggle_film(&mut self) {
+        if let Some(filming) = self.filming.take() {
+            let said = filming.end(&mut self.cockpit.time);
+            self.cockpit.note(said);
+            self.shown.film = None;
+            return;
+        }
+        match Filming::new(&self.cockpit, self.paint.size()) {
+            Ok(filming) => self.filming = Some(filming),
+            Err(problem) => self.cockpit.note(problem),
+        }
+    }
+
+    /// Films the frame that has come, if one has.
+    fn film(&mut self) {
+        let Some(filming) = &mut self.filming else { return };
+        let size = self.paint.size();
+        let done = match filming.awaits(&self.cockpit, size) {
+            Err(problem) => Err(problem),
+            Ok(false) => Ok(false),
+            Ok(true) => self.paint.copy(&self.cockpit, None).and_then(|pixels| filming.frame(&pixels)),
+        };
+        self.shown.film = Some(filming.done());
+        match done {
+            Ok(false) => {}
+            Ok(true) => self.toggle_film(),
+            Err(problem) => {
+                self.toggle_film();
+                self.cockpit.note(problem);
+            }
+        }
+    }
+
+    fn pressed(&mut self, key: KeyCode, events: &ActiveEventLoop) {
+        let held = |keys: [KeyCode; 2]| keys.iter().any(|key| self.held.contains(key));
+        let control = held([KeyCode::ControlLeft, KeyCode::ControlRight]);
+        let shift = held([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
+        let size = self.paint.size();
+        let cockpit = &mut self.cockpit;
+        if control {
+            match key {
+                KeyCode::KeyZ if shift => cockpit.editor.redo(),
+                KeyCode::KeyZ => cockpit.editor.undo(),
+                KeyCode::KeyY => cockpit.editor.redo(),
+                KeyCode::KeyS => cockpit.save_path(),
+                KeyCode::KeyO => {
+                    let file = cockpit.path_file.clone();
+                    cockpit.load_path(Path::new(file.trim()));
+                }
+                KeyCode::KeyQ => events.exit(),
+                _ => {}
+            }
+            return;
+        }
+        use crate::camera::Mode;
+        use crate::settings::{Method, Show, Style};
+        let settings = &mut cockpit.settings;
+        match key {
+            KeyCode::F1 => self.shown.help = !self.shown.help,
+            KeyCode::Escape => self.shown.help = false,
+            KeyCode::Tab => settings.panel = !settings.panel,
+            KeyCode::F12 => self.pictures.push(shift),
+            KeyCode::Digit1 => cockpit.change_mode(Mode::Fly),
+            KeyCode::Digit2 => cockpit.change_mode(Mode::Orbit),
+            KeyCode::Digit3 => cockpit.change_mode(Mode::Walk),
+            KeyCode::Digit4 => cockpit.change_mode(Mode::Boat),
+            KeyCode::Home => cockpit.home(),
+            KeyCode::KeyM => settings.method = neighbour(&Method::ALL, settings.method, shift),
+            KeyCode::KeyX => settings.show = neighbour(&Show::ALL, settings.show, shift),
+            KeyCode::KeyT => settings.style = neighbour(&Style::ALL, settings.style, shift),
+            KeyCode::Equal | KeyCode::NumpadAdd => {
+                settings.tolerance_pixels = (settings.tolerance_pixels / 1.25).max(0.1);
+            }
+            KeyCode::Minus | KeyCode::NumpadSubtract => {
+                settings.tolerance_pixels = (settings.tolerance_pixels * 1.25).min(50.0);
+            }
+            KeyCode::KeyF => cockpit.freeze(size),
+            KeyCode::KeyL => cockpit.editing = !cockpit.editing,
+            KeyCode::KeyB => {
+                let subject = cockpit.subject.clone();
+                cockpit.editor.add_eye(cockpit.camera.eye, &|at| subject.as_ref()?.surface(at));
+            }
+            KeyCode::Delete => {
+                if let Some(point) = cockpit.editor.selected {
+                    cockpit.editor.remove(point);
+                }
+            }
+            KeyCode::KeyP => cockpit.play(),
+            KeyCode::KeyR => self.toggle_film(),
+            KeyCode::Space if cockpit.playing.is_some() => cockpit.paused = !cockpit.paused,
+            KeyCode::Space => cockpit.still = !cockpit.still,
+            _ => {}
+        }
+    }
+
+    fn button(&mut self, button: MouseButton, down: bool) {
+        if !down {
+            if self.looking == Some(button) {
+                self.looking = None;
+            }
+            if button == MouseButton::Left {
+                self.dragged = None;
+                self.cockpit.editor.release();
+            }
+            return;
+        }
+        if button == MouseButton::Left && self.cockpit.editing {
+            let Some(subject) = self.cockpit.subject.clone() else { return };
+            let view = self.cockpit.view(self.paint.size());
+            let scale = self.egui.egui_ctx().pixels_per_point();
+            let surface = |at| subject.surface(at);
+            match self.cockpit.editor.pick(&view, self.cursor, 10.0 * scale, &surface) {
+                Some(point) => {
+                    self.cockpit.editor.selected = Some(point);
+                    self.dragged = Some(point);
+                }
+                None => match subject.seen(&view, self.cursor) {
+                    Some(place) => {
+                        self.cockpit.editor.add(place);
+                        self.dragged = self.cockpit.editor.selected;
+                    }
+                    None => self.cockpit.note("expected a click on the ground, got one on the sky; click lower"),
+                },
+            }
+        } else {
+            self.looking = Some(button);
+        }
+    }
+
+    fn moved(&mut self, to: Vec2) {
+        let by = to - self.cursor;
+        self.cursor = to;
+        if let (Some(point), Some(subject)) = (self.dragged, self.cockpit.subject.clone()) {
+            // A click that trembles drags nothing.
+            let view = self.cockpit.view(self.paint.size());
+            if by.length() > 0.0
+                && let Some(place) = subject.seen(&view, to)
+            {
+                self.cockpit.editor.move_to(point, place.truncate());
+            }
+        } else if self.looking.is_some() {
+            let radians = 1.0 / f64::from(self.cockpit.view(self.paint.size()).pixels_per_radian);
+            // The ground under the cursor follows it.
+            self.cockpit.camera.look(DVec2::new(-f64::from(by.x), f64::from(by.y)) * radians);
+        }
+    }
+
+    fn wheel(&mut self, by: f64) {
+        let cockpit = &mut self.cockpit;
+        if let (true, Some(point)) = (cockpit.editing, cockpit.editor.selected) {
+            let surface = {
+                let subject = cockpit.subject.clone();
+                move |at| subject.as_ref()?.surface(at)
+            };
+            let far = cockpit.editor.position(point, &surface).map_or(100.0, |at| at.distance(cockpit.camera.eye));
+            cockpit.editor.raise(point, (by * 0.01 * far).round());
+        } else if cockpit.camera.mode() == crate::camera::Mode::Orbit {
+            cockpit.camera.zoom(0.15 * by);
+        } else {
+            cockpit.settings.speed = (cockpit.settings.speed * 1.2f64.powf(by)).clamp(0.05, 20.0);
+        }
+    }
+}
+
+/// The next of a list, or the one before.
+fn neighbour<T: Copy + PartialEq>(all: &[T], now: T, back: bool) -> T {
+    let at = all.iter().position(|each| *each == now).unwrap_or(0);
+    all[(at + if back { all.len() - 1 } else { 1 }) % all.len()]
+}
+
+impl ApplicationHandler for App {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.flight.is_none() {
+            match Flight::new(events, self) {
+                Ok(flight) => self.flight = Some(flight),
+                Err(problem) => {
+                    self.problem = Some(problem);
+                    events.exit();
+                }
+            }
+        }
+    }
+
+    fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(flight) = &mut self.flight else { return };
+        // Tab opens and closes the panel; egui would wander through its fields.
+        let tab = matches!(&event, WindowEvent::KeyboardInput { event, .. } if event.physical_key == KeyCode::Tab);
+        if !tab {
+            let _ = flight.egui.on_window_event(&flight.window, &event);
+        }
+        let context = flight.egui.egui_ctx().clone();
+        match event {
+            WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::Resized(size) => flight.paint.resize(UVec2::new(size.width, size.height)),
+            WindowEvent::Focused(false) => {
+                flight.held.clear();
+                (flight.looking, flight.dragged) = (None, None);
+            }
+            WindowEvent::KeyboardInput { event, .. } => {
+                let PhysicalKey::Code(key) = event.physical_key else { return };
+                match event.state {
+                    ElementState::Released => {
+                        flight.held.remove(&key);
+                    }
+                    // What is typed into a field is no command.
+                    ElementState::Pressed if context.egui_wants_keyboard_input() => {}
+                    ElementState::Pressed => {
+                        flight.held.insert(key);
+                        if !event.repeat {
+                            flight.pressed(key, events);
+                        }
+                    }
+                }
+            }
+            WindowEvent::CursorMoved { position, .. } => {
+                flight.moved(Vec2::new(position.x as f32, position.y as f32));
+            }
+            WindowEvent::MouseInput { state, button, .. } => {
+                let down = state == ElementState::Pressed;
+                if !down || !context.is_pointer_over_egui() {
+                    flight.button(button, down);
+                }
+            }
+            WindowEvent::MouseWheel { delta, .. } if !context.is_pointer_over_egui() => {
+                flight.wheel(match delta {
+                    MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
+                    MouseScrollDelta::PixelDelta(pixels) => pixels.y / 50.0,
+                });
+            }
+            WindowEvent::DroppedFile(file) => flight.dropped.push(file),
+            WindowEvent::RedrawRequested => {
+                if let Err(problem) = flight.frame(events) {
+                    self.problem = Some(problem);
+                    events.exit();
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        if let Some(flight) = self.flight.as_ref().filter(|_| !events.exiting()) {
+            flight.window.request_redraw();
+        }
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        let Some(mut flight) = self.flight.take() else { return };
+        if let Some(filming) = flight.filming.take() {
+            let _ = filming.end(&mut flight.cockpit.time); // nobody reads notes any more
+        }
+        flight.slot.end();
+        if let (None, Some(file)) = (&flight.smoke, Settings::file())
+            && let Err(problem) = flight.cockpit.settings.save(&file)
+        {
+            eprintln!("littoral-fly: {problem}");
+        }
+        // A land that is being opened is not waited for; the scene ends with its frame.
+        if let Some(scene) = flight.scene.take()
+            && flight.cockpit.working.is_none()
+        {
+            let _ = scene.join();
+        }
+    }
+}
