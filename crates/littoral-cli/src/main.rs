@@ -6,6 +6,7 @@
 mod bench;
 mod detail;
 mod film;
+mod fly;
 mod ground;
 mod height;
 mod info;
@@ -61,6 +62,7 @@ struct General {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    Fly(fly::Fly),
     Info(info::Info),
     Height(height::Height),
     Profile(profile::Profile),
@@ -101,6 +103,7 @@ fn main() -> ExitCode {
     }
     let done = match arguments.command {
         Command::Render(command) => command.run(&mut talk),
+        Command::Fly(command) => command.run(),
         Command::Info(command) => command.run(&mut talk),
         Command::Height(command) => command.run(&mut talk),
         Command::Profile(command) => command.run(&mut talk),

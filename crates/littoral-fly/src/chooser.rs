@@ -20,16 +20,6 @@ pub struct Chooser<'a> {
     water_drawing: Drawing,
 }
 
-/// What was chosen.
-pub struct Chosen {
-    /// The ground.
-    pub ground: Mesh,
-    /// The water.
-    pub water: Option<Mesh>,
-    /// The worse of both.
-    pub reached: Reached,
-}
-
 /// No cell of water is smaller than this (m).
 const SMALLEST: f64 = 0.25;
 
@@ -70,31 +60,29 @@ impl<'a> Chooser<'a> {
         }
     }
 
-    /// The triangles for a view.
-    pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Chosen, ViewError> {
-        let (ground, mut reached) = match &mut self.flight {
+    /// The triangles of the ground for a view.
+    pub fn ground(&mut self, view: &View) -> Result<(Mesh, Reached), ViewError> {
+        match &mut self.flight {
             Some(flight) => {
                 let reached = flight.update(view, &mut || false)?;
-                (flight.mesh().clone(), reached)
+                Ok((flight.mesh().clone(), reached))
             }
-            None => choose(&mut *self.ground, self.land, view, &mut self.ground_drawing)?,
-        };
-        let mut water = None;
-        if let Some(sea) = sea {
-            let (method, triangles) = (self.method, self.triangles);
-            let lod = self.water.get_or_insert_with(|| {
-                let side = match sea.datum() {
-                    Datum::Plane { size, .. } => size.max_element(),
-                    Datum::Ellipsoid { equatorial_radius, .. } => equatorial_radius,
-                };
-                let finest = (side / SMALLEST).log2().ceil().clamp(0.0, 30.0) as u8;
-                method.within(Limits { finest, triangles })
-            });
-            let (mesh, its) = choose(&mut **lod, sea, view, &mut self.water_drawing)?;
-            reached = Reached { pixels: reached.pixels.max(its.pixels), limited: reached.limited | its.limited };
-            water = Some(mesh);
+            None => choose(&mut *self.ground, self.land, view, &mut self.ground_drawing),
         }
-        Ok(Chosen { ground, water, reached })
+    }
+
+    /// The triangles of a sea for a view.
+    pub fn water(&mut self, sea: &Sea, view: &View) -> Result<(Mesh, Reached), ViewError> {
+        let (method, triangles) = (self.method, self.triangles);
+        let lod = self.water.get_or_insert_with(|| {
+            let side = match sea.datum() {
+                Datum::Plane { size, .. } => size.max_element(),
+                Datum::Ellipsoid { equatorial_radius, .. } => equatorial_radius,
+            };
+            let finest = (side / SMALLEST).log2().ceil().clamp(0.0, 30.0) as u8;
+            method.within(Limits { finest, triangles })
+        });
+        choose(&mut **lod, sea, view, &mut self.water_drawing)
     }
 }
 

@@ -33,7 +33,7 @@ pub struct History {
     pub method: VecDeque<f32>,
     /// Triangles.
     pub triangles: VecDeque<f32>,
-    /// The bound that was reached (pixels).
+    /// The bound that was reached on the ground (pixels).
     pub bound: VecDeque<f32>,
 }
 
@@ -175,7 +175,7 @@ impl Cockpit {
                     }
                     History::push(&mut self.history.method, frame.milliseconds);
                     History::push(&mut self.history.triangles, frame.triangles() as f64);
-                    History::push(&mut self.history.bound, f64::from(frame.bound_pixels));
+                    History::push(&mut self.history.bound, f64::from(frame.ground_reached.pixels));
                     self.frame = Some(*frame);
                 }
             }

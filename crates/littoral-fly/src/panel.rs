@@ -34,9 +34,13 @@ pub struct Shown {
 
 /// Everything over the picture.
 pub fn show(ui: &mut Ui, cockpit: &mut Cockpit, shown: &mut Shown, size: UVec2, asks: &mut Vec<Ask>) {
+    // Over pictures of any colour, text must be bright.
+    let visuals = ui.visuals_mut();
+    visuals.override_text_color = Some(Color32::from_gray(225));
+    visuals.weak_text_color = Some(Color32::from_gray(165));
     status(ui, cockpit);
     if cockpit.settings.panel {
-        let frame = egui::Frame::side_top_panel(ui.style()).fill(Color32::from_black_alpha(200));
+        let frame = egui::Frame::side_top_panel(ui.style()).fill(Color32::from_black_alpha(215));
         egui::Panel::left("panel").default_size(270.0).frame(frame).show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| controls(ui, cockpit, shown, asks));
         });
@@ -103,7 +107,7 @@ fn help(ui: &Ui, shown: &mut Shown) {
 
 /// What is where, and how well it is drawn.
 fn status(ui: &mut Ui, cockpit: &Cockpit) {
-    let frame = egui::Frame::side_top_panel(ui.style()).fill(Color32::from_black_alpha(200));
+    let frame = egui::Frame::side_top_panel(ui.style()).fill(Color32::from_black_alpha(215));
     egui::Panel::bottom("status").frame(frame).show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 14.0;
@@ -113,11 +117,16 @@ fn status(ui: &mut Ui, cockpit: &Cockpit) {
             if let Some(frame) = &cockpit.frame {
                 ui.label(format!("{} in {:.1} ms", cockpit.settings.method.words().0, frame.milliseconds));
                 ui.label(format!("{} triangles", thousands(frame.triangles())));
-                let bound = format!("within {:.2} px", frame.bound_pixels);
-                match frame.limited {
-                    true => ui.colored_label(Color32::ORANGE, bound + " (the most triangles)"),
-                    false => ui.label(bound),
-                };
+                for (what, reached) in [("ground", Some(frame.ground_reached)), ("sea", frame.water_reached)] {
+                    let Some(reached) = reached else { continue };
+                    let bound = format!("{what} within {:.2} px", reached.pixels);
+                    match reached.limited {
+                        true => ui
+                            .colored_label(Color32::ORANGE, bound)
+                            .on_hover_text("the most triangles, not the tolerance, ended the refinement"),
+                        false => ui.label(bound),
+                    };
+                }
             }
             if let Some(subject) = &cockpit.subject {
                 ui.separator();
@@ -125,9 +134,10 @@ fn status(ui: &mut Ui, cockpit: &Cockpit) {
                 let stretch = subject.order.exaggeration;
                 ui.label(subject.shown(eye.truncate()));
                 ui.label(format!("height {:.1} m", eye.z / stretch));
-                match subject.ground(eye.truncate()) {
-                    Some(ground) => ui.label(format!("{:.1} m over ground", (eye.z - ground) / stretch)),
-                    None => ui.label("no ground below"),
+                match (subject.ground(eye.truncate()), subject.still_water(eye.truncate())) {
+                    (_, Some(water)) => ui.label(format!("{:.1} m over water", (eye.z - water) / stretch)),
+                    (Some(ground), None) => ui.label(format!("{:.1} m over ground", (eye.z - ground) / stretch)),
+                    (None, None) => ui.label("no ground below"),
                 };
                 ui.label(RichText::new(&subject.datum).weak());
                 if stretch != 1.0 {
@@ -217,7 +227,7 @@ fn moving(ui: &mut Ui, cockpit: &mut Cockpit) {
 }
 
 fn look(ui: &mut Ui, cockpit: &mut Cockpit) {
-    section(ui, "Light and colours", true, |ui| {
+    section(ui, "Light and colours", false, |ui| {
         let own_sun = cockpit.own_sun();
         let settings = &mut cockpit.settings;
         egui::ComboBox::from_id_salt("style").selected_text(settings.style.name()).show_ui(ui, |ui| {

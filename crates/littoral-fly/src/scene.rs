@@ -10,7 +10,7 @@ use crate::settings::Method;
 use crate::subject::{Order, Subject};
 use glam::DVec2;
 use littoral::field::Sea;
-use littoral::lod::{Mesh, NestedBounds};
+use littoral::lod::{Mesh, NestedBounds, Reached};
 use littoral::picture::{self, Air, Border, Climate, Scene, Shot, Stage, Sun};
 use littoral::space::{Datum, View};
 use littoral::waves::SeaState;
@@ -66,10 +66,10 @@ pub struct Frame {
     pub ground: Mesh,
     /// The water.
     pub water: Option<Mesh>,
-    /// No sample that is seen is farther from its place than this (pixels).
-    pub bound_pixels: f32,
-    /// Whether the number of triangles, not the tolerance, ended the refinement.
-    pub limited: bool,
+    /// How well the ground is drawn.
+    pub ground_reached: Reached,
+    /// How well the water is drawn.
+    pub water_reached: Option<Reached>,
     /// How long the choice took (ms).
     pub milliseconds: f64,
     /// Heights of the water (m) at the wish's probes.
@@ -371,7 +371,9 @@ fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish, serial: u64)
         }
         &*sea
     });
-    let chosen = chooser.choose(sea, &wish.view).map_err(|e| e.to_string())?;
+    let (ground, ground_reached) = chooser.ground(&wish.view).map_err(|e| e.to_string())?;
+    let water = sea.map(|sea| chooser.water(sea, &wish.view)).transpose().map_err(|e| e.to_string())?;
+    let (water, water_reached) = water.unzip();
     let heights = sea.zip(wish.probes).map(|(sea, probes)| {
         let mut heights = [0.0; 4];
         sea.heights_at(&probes, &mut heights);
@@ -381,10 +383,10 @@ fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish, serial: u64)
         serial,
         view: wish.view,
         time: wish.time,
-        ground: chosen.ground,
-        water: chosen.water,
-        bound_pixels: chosen.reached.pixels,
-        limited: chosen.reached.limited,
+        ground,
+        water,
+        ground_reached,
+        water_reached,
         milliseconds: started.elapsed().as_secs_f64() * 1e3,
         heights,
     })

@@ -173,7 +173,7 @@ impl Default for Settings {
             version: VERSION,
             method: Method::default(),
             tolerance_pixels: 1.0,
-            triangles: 500_000,
+            triangles: 150_000,
             style: Style::default(),
             show: Show::default(),
             own_sun: true,

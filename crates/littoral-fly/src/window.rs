@@ -27,7 +27,10 @@ use winit::window::{Window, WindowId};
 /// Opens the window and flies until it is closed.
 pub fn run(arguments: Arguments, settings: Settings, note: Option<String>) -> Result<(), String> {
     let no_display = |e: &dyn std::fmt::Display| {
-        let what = e.to_string().replace('\n', " ");
+        // "os error at FILE:LINE: what went wrong"
+        let text = e.to_string().replace('\n', " ");
+        let what = text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, what)| what);
+        let what = what.trim_end_matches('.');
         format!(
             "expected a display to open a window on, found none ({what}); start it in a desktop session, set DISPLAY or WAYLAND_DISPLAY, or draw without a window: littoral render"
         )
@@ -268,7 +271,7 @@ impl Flight {
         smoke.milliseconds.push((passed * 1e3) as f32);
         smoke.method.push(frame.milliseconds as f32);
         smoke.triangles.push(frame.triangles() as f32);
-        smoke.bound.push(frame.bound_pixels);
+        smoke.bound.push(frame.ground_reached.pixels);
         if smoke.milliseconds.len() as u32 >= smoke.frames {
             let size = self.paint.size();
             let answer = Answer {
