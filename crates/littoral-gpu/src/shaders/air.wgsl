@@ -81,28 +81,33 @@ fn sunlight(height: f32) -> vec3f {
     return textureSampleLevel(sunlight_map, smooth_sampler, vec2f((at * 255.0 + 0.5) / 256.0, 0.5), 0.0).rgb;
 }
 
-// Irradiance (klx) of nine harmonics on a surface of this normal.
-fn irradiance_of(light: array<vec3f, 9>, d: vec3f) -> vec3f {
-    const A = PI;
-    const B = 2.0 * PI / 3.0;
+// What each of nine harmonics of light adds to the irradiance on a surface of this normal: the cosine lobe's share of it.
+fn weight_of(i: i32, d: vec3f) -> f32 {
+    const A = PI * 0.282095;
+    const B = 2.0 * PI / 3.0 * 0.488603;
     const C = PI / 4.0;
-    let sum = light[0] * (A * 0.282095)
-        + (light[1] * d.y + light[2] * d.z + light[3] * d.x) * (B * 0.488603)
-        + (light[4] * (d.x * d.y) + light[5] * (d.y * d.z) + light[7] * (d.x * d.z)) * (C * 1.092548)
-        + light[6] * (C * 0.315392 * (3.0 * d.z * d.z - 1.0))
-        + light[8] * (C * 0.546274 * (d.x * d.x - d.y * d.y));
-    return max(sum, vec3f(0.0));
+    switch i {
+        case 0: { return A; }
+        case 1: { return B * d.y; }
+        case 2: { return B * d.z; }
+        case 3: { return B * d.x; }
+        case 4: { return C * 1.092548 * d.x * d.y; }
+        case 5: { return C * 1.092548 * d.y * d.z; }
+        case 6: { return C * 0.315392 * (3.0 * d.z * d.z - 1.0); }
+        case 7: { return C * 1.092548 * d.x * d.z; }
+        default: { return C * 0.546274 * (d.x * d.x - d.y * d.y); }
+    }
 }
 
-// Light from the sky and the land around on a surface at a place.
+// Irradiance (klx) of light from the sky and the land around on a surface at a place.
 fn irradiance_at(rel: vec2f, normal: vec3f) -> vec3f {
     let size = vec2f(textureDimensions(skylight_map));
     let uv = (clamp(frame.skylight.xy + rel * frame.skylight.zw, vec2f(0.0), size - 1.0) + 0.5) / size;
-    var light: array<vec3f, 9>;
+    var sum = vec3f(0.0);
     for (var i = 0; i < 9; i++) {
-        light[i] = textureSampleLevel(skylight_map, smooth_sampler, uv, i, 0.0).rgb / GAIN;
+        sum += textureSampleLevel(skylight_map, smooth_sampler, uv, i, 0.0).rgb * weight_of(i, normal);
     }
-    return irradiance_of(light, normal);
+    return max(sum, vec3f(0.0)) / GAIN;
 }
 
 // How much of the sun is seen, coarsely.
@@ -114,9 +119,9 @@ fn sunny_at(rel: vec2f) -> f32 {
 
 // The same from all around on an open plain.
 fn irradiance_open(normal: vec3f) -> vec3f {
-    var light: array<vec3f, 9>;
+    var sum = vec3f(0.0);
     for (var i = 0; i < 9; i++) {
-        light[i] = frame.open[i].rgb;
+        sum += frame.open[i].rgb * weight_of(i, normal);
     }
-    return irradiance_of(light, normal);
+    return max(sum, vec3f(0.0));
 }

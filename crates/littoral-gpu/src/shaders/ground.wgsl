@@ -35,6 +35,16 @@ fn sample_of(rel: vec2f) -> vec2f {
     return frame.eye.xy + rel * frame.map.xy;
 }
 
+// Along a row of four samples: the height between the middle ones, the rise and the bend there.
+fn along_row(i: vec2i, row: i32, size: vec2i, level: u32, u: f32) -> vec3f {
+    let j = clamp(row, 0, size.y - 1);
+    let h0 = height_of(vec2i(max(i.x - 1, 0), j), level);
+    let h1 = height_of(vec2i(i.x, j), level);
+    let h2 = height_of(vec2i(i.x + 1, j), level);
+    let h3 = height_of(vec2i(min(i.x + 2, size.x - 1), j), level);
+    return vec3f(mix(h1, h2, u), mix(h2 - h0, h3 - h1, u), mix(h0 + h2 - 2.0 * h1, h1 + h3 - 2.0 * h2, u));
+}
+
 fn surface_of(place: vec2f, level: u32) -> Surface {
     let size = size_of(level);
     let last = vec2f(size - 1);
@@ -42,25 +52,16 @@ fn surface_of(place: vec2f, level: u32) -> Surface {
     let p = clamp(place * scale, vec2f(0.0), last);
     let ij = min(vec2i(p), size - 2);
     let uv = p - vec2f(ij);
-    var m: array<f32, 4>;
-    var rise: array<f32, 4>;
-    var bend: array<f32, 4>;
-    for (var dj = 0; dj < 4; dj++) {
-        let j = clamp(ij.y + dj - 1, 0, size.y - 1);
-        let h0 = height_of(vec2i(max(ij.x - 1, 0), j), level);
-        let h1 = height_of(vec2i(ij.x, j), level);
-        let h2 = height_of(vec2i(ij.x + 1, j), level);
-        let h3 = height_of(vec2i(min(ij.x + 2, size.x - 1), j), level);
-        m[dj] = mix(h1, h2, uv.x);
-        rise[dj] = mix(h2 - h0, h3 - h1, uv.x);
-        bend[dj] = mix(h0 + h2 - 2.0 * h1, h1 + h3 - 2.0 * h2, uv.x);
-    }
+    let r0 = along_row(ij, ij.y - 1, size, level, uv.x);
+    let r1 = along_row(ij, ij.y, size, level, uv.x);
+    let r2 = along_row(ij, ij.y + 1, size, level, uv.x);
+    let r3 = along_row(ij, ij.y + 2, size, level, uv.x);
     let s = frame.map.xy * scale;
-    let along = mix(m[0] + m[2] - 2.0 * m[1], m[1] + m[3] - 2.0 * m[2], uv.y);
+    let along = mix(r0.x + r2.x - 2.0 * r1.x, r1.x + r3.x - 2.0 * r2.x, uv.y);
     return Surface(
-        mix(m[1], m[2], uv.y),
-        0.5 * vec2f(mix(rise[1], rise[2], uv.y), mix(m[2] - m[0], m[3] - m[1], uv.y)) * s,
-        0.5 * (mix(bend[1], bend[2], uv.y) * s.x * s.x + along * s.y * s.y),
+        mix(r1.x, r2.x, uv.y),
+        0.5 * vec2f(mix(r1.y, r2.y, uv.y), mix(r2.x - r0.x, r3.x - r1.x, uv.y)) * s,
+        0.5 * (mix(r1.z, r2.z, uv.y) * s.x * s.x + along * s.y * s.y),
     );
 }
 

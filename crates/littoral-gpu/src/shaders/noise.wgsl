@@ -1,13 +1,6 @@
 // Gradient noise as in the engine's `picture::grain`: K. Perlin, "Improving noise", SIGGRAPH 2002, with its exact gradient. Where the eye is among the
 // noise's lattice is told by the frame in integers and what is left, so that noise is as fine far from the origin as near it.
 
-const GRADIENTS = array<vec3f, 16>(
-    vec3f(1.0, 1.0, 0.0), vec3f(-1.0, 1.0, 0.0), vec3f(1.0, -1.0, 0.0), vec3f(-1.0, -1.0, 0.0),
-    vec3f(1.0, 0.0, 1.0), vec3f(-1.0, 0.0, 1.0), vec3f(1.0, 0.0, -1.0), vec3f(-1.0, 0.0, -1.0),
-    vec3f(0.0, 1.0, 1.0), vec3f(0.0, -1.0, 1.0), vec3f(0.0, 1.0, -1.0), vec3f(0.0, -1.0, -1.0),
-    vec3f(1.0, 1.0, 0.0), vec3f(-1.0, 1.0, 0.0), vec3f(0.0, -1.0, 1.0), vec3f(0.0, -1.0, -1.0),
-);
-
 fn hash(p: vec3u, seed: u32) -> u32 {
     var h = (p.x * 0x8DA6B343u) ^ (p.y * 0xD8163841u) ^ (p.z * 0xCB1AB31Fu);
     h ^= seed * 0x9E3779B9u;
@@ -38,29 +31,73 @@ struct Grain {
     gradient: vec3f,
 }
 
-// Noise number `id` at a place `rel` metres from the eye east and north, and `z` in its own third coordinate.
-fn grain(id: u32, rel: vec2f, z: f32, seed: u32) -> Grain {
+// Where a place is in the lattice of noise number `id`: `rel` metres from the eye east and north, `z` in its own third coordinate.
+struct Cell {
+    base: vec3u,
+    f: vec3f,
+}
+
+fn cell_of(id: u32, rel: vec2f, z: f32) -> Cell {
     let n = frame.noise[id];
     let p = vec3f(n.rest + vec2f(dot(n.matrix.xy, rel), dot(n.matrix.zw, rel)), z);
     let whole = floor(p);
-    let f = p - whole;
-    let base = bitcast<vec3u>(vec3i(whole) + vec3i(n.cell, 0));
-    var g: array<vec3f, 8>;
-    var d: array<f32, 8>;
-    for (var c = 0u; c < 8u; c++) {
-        let corner = vec3u(c & 1u, (c >> 1u) & 1u, c >> 2u);
-        g[c] = gradient_of(hash(base + corner, seed));
-        d[c] = dot(g[c], f - vec3f(corner));
-    }
-    let u = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
+    return Cell(bitcast<vec3u>(vec3i(whole) + vec3i(n.cell, 0)), p - whole);
+}
+
+fn corner_gradient(cell: Cell, seed: u32, corner: vec3u) -> vec3f {
+    return gradient_of(hash(cell.base + corner, seed));
+}
+
+fn corner_value(cell: Cell, seed: u32, corner: vec3u) -> f32 {
+    return dot(corner_gradient(cell, seed, corner), cell.f - vec3f(corner));
+}
+
+fn fade(f: vec3f) -> vec3f {
+    return f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
+}
+
+// The noise and its gradient, per unit of its own coordinates.
+fn grain(id: u32, rel: vec2f, z: f32, seed: u32) -> Grain {
+    let cell = cell_of(id, rel, z);
+    let f = cell.f;
+    let g0 = corner_gradient(cell, seed, vec3u(0u, 0u, 0u));
+    let g1 = corner_gradient(cell, seed, vec3u(1u, 0u, 0u));
+    let g2 = corner_gradient(cell, seed, vec3u(0u, 1u, 0u));
+    let g3 = corner_gradient(cell, seed, vec3u(1u, 1u, 0u));
+    let g4 = corner_gradient(cell, seed, vec3u(0u, 0u, 1u));
+    let g5 = corner_gradient(cell, seed, vec3u(1u, 0u, 1u));
+    let g6 = corner_gradient(cell, seed, vec3u(0u, 1u, 1u));
+    let g7 = corner_gradient(cell, seed, vec3u(1u, 1u, 1u));
+    let d0 = dot(g0, f);
+    let d1 = dot(g1, f - vec3f(1.0, 0.0, 0.0));
+    let d2 = dot(g2, f - vec3f(0.0, 1.0, 0.0));
+    let d3 = dot(g3, f - vec3f(1.0, 1.0, 0.0));
+    let d4 = dot(g4, f - vec3f(0.0, 0.0, 1.0));
+    let d5 = dot(g5, f - vec3f(1.0, 0.0, 1.0));
+    let d6 = dot(g6, f - vec3f(0.0, 1.0, 1.0));
+    let d7 = dot(g7, f - vec3f(1.0, 1.0, 1.0));
+    let u = fade(f);
     let du = 30.0 * f * f * (f * (f - 2.0) + 1.0);
-    let x = vec4f(mix(d[0], d[1], u.x), mix(d[2], d[3], u.x), mix(d[4], d[5], u.x), mix(d[6], d[7], u.x));
+    let x = vec4f(mix(d0, d1, u.x), mix(d2, d3, u.x), mix(d4, d5, u.x), mix(d6, d7, u.x));
     let y = vec2f(mix(x.x, x.y, u.y), mix(x.z, x.w, u.y));
-    let gy0 = mix(mix(g[0], g[1], u.x), mix(g[2], g[3], u.x), u.y);
-    let gy1 = mix(mix(g[4], g[5], u.x), mix(g[6], g[7], u.x), u.y);
-    let along_x = mix(mix(d[1] - d[0], d[3] - d[2], u.y), mix(d[5] - d[4], d[7] - d[6], u.y), u.z);
+    let low = mix(mix(g0, g1, u.x), mix(g2, g3, u.x), u.y);
+    let high = mix(mix(g4, g5, u.x), mix(g6, g7, u.x), u.y);
+    let along_x = mix(mix(d1 - d0, d3 - d2, u.y), mix(d5 - d4, d7 - d6, u.y), u.z);
     let along_y = mix(x.y - x.x, x.w - x.z, u.z);
-    return Grain(mix(y.x, y.y, u.z), mix(gy0, gy1, u.z) + du * vec3f(along_x, along_y, y.y - y.x));
+    return Grain(mix(y.x, y.y, u.z), mix(low, high, u.z) + du * vec3f(along_x, along_y, y.y - y.x));
+}
+
+// Its value alone.
+fn value_of(id: u32, rel: vec2f, z: f32, seed: u32) -> f32 {
+    let cell = cell_of(id, rel, z);
+    let u = fade(cell.f);
+    let x = vec4f(
+        mix(corner_value(cell, seed, vec3u(0u, 0u, 0u)), corner_value(cell, seed, vec3u(1u, 0u, 0u)), u.x),
+        mix(corner_value(cell, seed, vec3u(0u, 1u, 0u)), corner_value(cell, seed, vec3u(1u, 1u, 0u)), u.x),
+        mix(corner_value(cell, seed, vec3u(0u, 0u, 1u)), corner_value(cell, seed, vec3u(1u, 0u, 1u)), u.x),
+        mix(corner_value(cell, seed, vec3u(0u, 1u, 1u)), corner_value(cell, seed, vec3u(1u, 1u, 1u)), u.x),
+    );
+    return mix(mix(x.x, x.y, u.y), mix(x.z, x.w, u.y), u.z);
 }
 
 // How much of a wave of this length a pixel of this footprint can show, in [0, 1].
@@ -75,5 +112,5 @@ fn patch_of(id: u32, rel: vec2f, z: f32, wavelength: f32, footprint: f32, seed: 
     if share == 0.0 {
         return 0.0;
     }
-    return grain(id, rel, z, seed).value * share;
+    return value_of(id, rel, z, seed) * share;
 }
