@@ -8,10 +8,12 @@
 
 mod device;
 mod frame;
+mod painter;
 mod renderer;
 mod scenery;
 
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
+pub use painter::{Painter, PainterError};
 pub use renderer::{Renderer, SHADERS, Shown, Triangles};
 pub use scenery::{Scenery, TooLarge};
