@@ -15,5 +15,5 @@ mod scenery;
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};
-pub use renderer::{Renderer, SHADERS, Shown, Triangles};
+pub use renderer::{Renderer, SHADERS, Triangles};
 pub use scenery::{Scenery, TooLarge};

@@ -8,7 +8,7 @@ use littoral::lod::{Mesh, Vertex};
 use littoral::space::View;
 
 /// Every shader with its name, as it is compiled: for tests that need no device.
-pub const SHADERS: [(&str, &str); 3] = [
+pub const SHADERS: [(&str, &str); 4] = [
     ("surface", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/surface.wgsl"))),
     (
         "shade",
@@ -23,6 +23,7 @@ pub const SHADERS: [(&str, &str); 3] = [
         ),
     ),
     ("display", include_str!("shaders/display.wgsl")),
+    ("wires", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/wires.wgsl"))),
 ];
 
 const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -40,8 +41,8 @@ pub struct Triangles {
 impl Triangles {
     /// Brings a mesh to the device, in memory used before if that is large enough.
     pub fn set(&mut self, gpu: &Gpu, mesh: &Mesh) {
-        fill(gpu, &mut self.vertices, "vertices", wgpu::BufferUsages::VERTEX, bytemuck::cast_slice(&mesh.vertices));
-        fill(gpu, &mut self.corners, "triangles", wgpu::BufferUsages::INDEX, bytemuck::cast_slice(&mesh.triangles));
+        fill(gpu, &mut self.vertices, "vertices", VERTICES, bytemuck::cast_slice(&mesh.vertices));
+        fill(gpu, &mut self.corners, "triangles", CORNERS, bytemuck::cast_slice(&mesh.triangles));
         self.count = 3 * mesh.triangles.len() as u32;
     }
 
@@ -55,6 +56,9 @@ impl Triangles {
         self.count == 0
     }
 }
+
+const VERTICES: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::STORAGE);
+const CORNERS: wgpu::BufferUsages = wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE);
 
 /// Writes bytes into a buffer, making a new one half as large again where they do not fit.
 fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) {
@@ -80,21 +84,13 @@ struct Canvas {
     radiance: wgpu::Texture,
 }
 
-/// How a picture is shown on a screen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shown {
-    /// The radiance (kcd/m²) that is shown as middle grey.
-    pub grey: f32,
-    /// Whether the mesh's edges are drawn over it.
-    pub wireframe: bool,
-}
-
 /// Draws sceneries. Made once for a device and the format of what is drawn to.
 #[derive(Debug)]
 pub struct Renderer {
     surface: wgpu::RenderPipeline,
     shade: wgpu::RenderPipeline,
     display: wgpu::RenderPipeline,
+    wires: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
     sampler: wgpu::Sampler,
     uniforms: wgpu::Buffer,
@@ -106,7 +102,7 @@ impl Renderer {
     /// A renderer that draws to targets of a format: 8 bits a channel, encoded as sRGB by the format or not.
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Renderer {
         let device = &gpu.device;
-        let [surface, shade, display] = SHADERS.map(|(label, source)| {
+        let [surface, shade, display, wires] = SHADERS.map(|(label, source)| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(label),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -164,6 +160,37 @@ impl Renderer {
                 cache: None,
             })
         };
+        let wires = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("wires"),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &wires,
+                entry_point: Some("wire"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(false),
+                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &wires,
+                entry_point: Some("drawn"),
+                compilation_options: Default::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format,
+                    blend: Some(wgpu::BlendState::ALPHA_BLENDING),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
         let uniform = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -176,6 +203,7 @@ impl Renderer {
             surface,
             shade: everywhere("shade", &shade, RADIANCE),
             display: everywhere("display", &display, format),
+            wires,
             format,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("smooth"),
@@ -290,11 +318,55 @@ impl Renderer {
         pass.draw(0..3, 0..1);
     }
 
-    /// Records the pass that shows what was drawn last.
-    pub fn show(&self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, how: Shown, target: &wgpu::TextureView) {
+    /// Records the pass that draws the edges of triangles over what was shown: onto a target of the size that was drawn. What lies behind the ground is hidden.
+    pub fn wires(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        triangles: &Triangles,
+        target: &wgpu::TextureView,
+    ) {
         let Some(canvas) = &self.canvas else { return };
+        let (Some(vertices), Some(corners), false) = (&triangles.vertices, &triangles.corners, triangles.is_empty())
+        else {
+            return;
+        };
+        let buffers = [(0, &self.uniforms), (16, vertices), (17, corners)];
+        let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("wires"),
+            layout: &self.wires.get_bind_group_layout(0),
+            entries: &buffers
+                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }),
+        });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("wires"),
+            color_attachments: &[Some(onto(target, wgpu::LoadOp::Load))],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &canvas.depth,
+                depth_ops: None,
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.wires);
+        pass.set_bind_group(0, &bound, &[]);
+        pass.draw(0..triangles.count, 0..1);
+    }
+
+    /// Records the pass that shows what was drawn last on a target of some size (pixels), the drawn picture stretched over all of it. `grey` is the radiance (kcd/m²) that is shown
+    /// as middle grey.
+    pub fn show(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        grey: f32,
+        target: &wgpu::TextureView,
+        size: UVec2,
+    ) {
+        let Some(canvas) = &self.canvas else { return };
+        let stretch = canvas.size.as_vec2() / size.max(UVec2::ONE).as_vec2();
         let encodes = if self.format.is_srgb() { 1.0 } else { 0.0 };
-        let shown = [0.30 / how.grey.max(1e-9), encodes, 0.0, 0.0f32];
+        let shown = [0.30 / grey.max(1e-9), encodes, stretch.x, stretch.y];
         gpu.queue.write_buffer(&self.shown, 0, bytemuck::cast_slice(&shown));
         let radiance = canvas.radiance.create_view(&Default::default());
         let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {

@@ -1,7 +1,7 @@
 // From radiance to the screen: the engine's `picture::display`.
 
 @group(0) @binding(0) var radiance_map: texture_2d<f32>;
-// x: what radiance is multiplied by; y: whether the target encodes sRGB by itself.
+// What radiance is multiplied by; whether the target encodes sRGB by itself; pixels of the picture for each of the target.
 @group(0) @binding(1) var<uniform> shown: vec4f;
 
 @vertex
@@ -32,9 +32,25 @@ fn film(light: vec3f) -> vec3f {
     return saturate(outset * saturate(grey + (contrasted - grey) * 1.28));
 }
 
+// A pixel as it is shown.
+fn shown_at(at: vec2i) -> vec3f {
+    let last = vec2i(textureDimensions(radiance_map)) - 1;
+    return film(textureLoad(radiance_map, clamp(at, vec2i(0), last), 0).rgb * shown.x);
+}
+
 @fragment
 fn display(@builtin(position) position: vec4f) -> @location(0) vec4f {
-    let encoded = film(textureLoad(radiance_map, vec2i(position.xy), 0).rgb * shown.x);
+    var encoded: vec3f;
+    if all(shown.zw == vec2f(1.0)) {
+        encoded = shown_at(vec2i(position.xy));
+    } else {
+        // Between the four nearest pixels.
+        let p = position.xy * shown.zw - 0.5;
+        let i = vec2i(floor(p));
+        let f = p - floor(p);
+        let top = mix(shown_at(i), shown_at(i + vec2i(1, 0)), f.x);
+        encoded = mix(top, mix(shown_at(i + vec2i(0, 1)), shown_at(i + 1), f.x), f.y);
+    }
     if shown.y == 0.0 {
         return vec4f(encoded, 1.0);
     }

@@ -12,8 +12,3 @@ fn surface(@location(0) at: vec2u, @location(1) height: f32) -> Seen {
     seen.position = frame.clip_from_eye * vec4f(steps * frame.step.xy, height - frame.eye.z, 1.0);
     return seen;
 }
-
-@fragment
-fn line() -> @location(0) vec4f {
-    return vec4f(0.02, 0.02, 0.02, 0.55);
-}
