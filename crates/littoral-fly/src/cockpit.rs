@@ -1,10 +1,10 @@
 //! The state of a flight, apart from window and scene: what is wished for, what came, and what the hands do with it.
 
 use crate::camera::{Camera, Hands, Mode, World};
-use crate::draw;
+use crate::draw::Scenery;
 use crate::editor::Editor;
 use crate::scene::{Frame, Look, News, Wish};
-use crate::settings::Settings;
+use crate::settings::{Settings, Style};
 use crate::subject::{Order, Subject};
 use crate::tape::Tape;
 use glam::{DVec2, DVec3, UVec2, Vec2};
@@ -73,7 +73,7 @@ pub struct Cockpit {
     serial: u64,
     shot: Option<Shot>,
     /// Its light and colours.
-    pub scenery: Option<Arc<draw::Scenery>>,
+    pub scenery: Option<Scenery>,
     /// The newest meshes.
     pub frame: Option<Frame>,
     /// The eye.
@@ -105,6 +105,8 @@ pub struct Cockpit {
     pub history: History,
     /// What the sea's state is while it is typed.
     pub sea_text: String,
+    /// Logarithm of the radiance that is shown as middle grey.
+    grey: Option<f32>,
     clock: f64,
 }
 
@@ -136,6 +138,7 @@ impl Cockpit {
             working: Some(("opening".to_owned(), 0.0)),
             notes: Vec::new(),
             history: History::default(),
+            grey: None,
             clock: 0.0,
         }
     }
@@ -188,7 +191,7 @@ impl Cockpit {
             same.then(|| subject.order.exaggeration / before.order.exaggeration)
         });
         subject.notes.clone().into_iter().for_each(|note| self.note(note));
-        (self.serial, self.scenery, self.frame, self.frozen) = (serial, None, None, None);
+        (self.serial, self.scenery, self.frame, self.frozen, self.grey) = (serial, None, None, None, None);
         (self.taped, self.tape, self.playing) = (None, None, None);
         self.subject = Some(subject);
         match stretch {
@@ -252,11 +255,13 @@ impl Cockpit {
         let visibility = (settings.visibility_kilometres > 0.0).then_some(settings.visibility_kilometres * 1000.0);
         Wish {
             order: self.order.clone(),
-            look: Look { style: settings.style.picture(), sun, visibility },
+            look: Look { sun, visibility },
             sea: settings.waves.then(|| settings.sea.clone()),
             method: settings.method,
             triangles: settings.triangles as usize,
             view: self.lod_view(size),
+            eye: self.view(size),
+            waves: settings.style == Style::Plain,
             time: self.time,
             probes: (self.camera.mode() == Mode::Boat).then(|| self.camera.boat.probes()),
         }
@@ -315,6 +320,7 @@ impl Cockpit {
             self.time += seconds;
         }
         self.camera.speed = self.settings.speed;
+        self.adapt(seconds);
         self.retape();
         match (self.playing, &self.tape) {
             (Some(at), Some(tape)) => {
@@ -329,6 +335,21 @@ impl Cockpit {
                 self.with_world(|camera, world| camera.step(hands, seconds, world));
             }
         }
+    }
+
+    /// The eye gets used to the light.
+    fn adapt(&mut self, seconds: f64) {
+        const SECONDS: f64 = 0.8;
+        if let Some(frame) = &self.frame {
+            let seen = frame.grey.max(1e-9).ln();
+            let left = (-seconds / SECONDS).exp() as f32;
+            self.grey = Some(self.grey.map_or(seen, |used| seen + (used - seen) * left));
+        }
+    }
+
+    /// The radiance that is shown as middle grey (kcd/m²).
+    pub fn grey(&self) -> f32 {
+        self.grey.map_or(1.0, f32::exp)
     }
 
     /// Follows the path with its tape.

@@ -13,6 +13,7 @@ mod film;
 mod keys;
 mod paint;
 mod panel;
+mod plain;
 mod plots;
 mod scene;
 mod settings;
@@ -63,9 +64,12 @@ struct Arguments {
     /// The most triangles of the ground, and as many of the sea
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1000..=20_000_000))]
     triangles: Option<u32>,
-    /// How the ground is coloured
-    #[arg(long, value_parser = named::<Style>, value_name = "own|natural|tint|relief")]
+    /// How the picture is drawn: in the light of the data, or as the triangles themselves
+    #[arg(long, value_parser = named::<Style>, value_name = "natural|plain")]
     style: Option<Style>,
+    /// One pixel of light for so many of the window's, each way: natural pictures without a graphics card [default: 1; 3 without a graphics card]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8))]
+    coarse: Option<u32>,
     /// What is seen of the mesh
     #[arg(long, value_parser = named::<Show>, value_name = "textured|wireframe|both")]
     show: Option<Show>,
@@ -119,6 +123,7 @@ impl Arguments {
         settings.tolerance_pixels = self.tolerance.unwrap_or(settings.tolerance_pixels);
         settings.triangles = self.triangles.unwrap_or(settings.triangles);
         settings.style = self.style.unwrap_or(settings.style);
+        settings.coarse = self.coarse.unwrap_or(settings.coarse);
         settings.show = self.show.unwrap_or(settings.show);
         settings.mode = self.mode.unwrap_or(settings.mode);
         if let Some(sea) = &self.sea {

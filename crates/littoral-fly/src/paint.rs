@@ -2,7 +2,6 @@
 
 use crate::cockpit::Cockpit;
 use crate::draw;
-use crate::settings::Show;
 use glam::UVec2;
 use littoral_gpu::Gpu;
 use std::sync::Arc;
@@ -139,27 +138,16 @@ impl Paint {
         self.pixels(&texture)
     }
 
-    fn picture(&self, cockpit: &Cockpit, target: &wgpu::TextureView) {
+    fn picture(&mut self, cockpit: &Cockpit, target: &wgpu::TextureView) {
+        let size = self.size();
         if let (Some(scenery), Some(frame)) = (&cockpit.scenery, &cockpit.frame) {
-            let show = cockpit.settings.show;
-            let drawn = draw::Frame {
-                view: &cockpit.view(self.size()),
-                ground: &frame.ground,
-                water: frame.water.as_ref(),
-                surface: show != Show::Wireframe,
-                wireframe: show != Show::Textured,
-            };
-            self.renderer.draw(&self.gpu, scenery, &drawn, target);
-            return;
+            let view = |size| cockpit.view(size);
+            let (settings, grey) = (&cockpit.settings, cockpit.grey());
+            return self.renderer.draw(&self.gpu, scenery, frame, settings, grey, &view, target, size);
         }
         // Nothing to see yet.
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let colour = wgpu::Color { r: 0.16, g: 0.20, b: 0.24, a: 1.0 };
-        drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("empty"),
-            color_attachments: &[Some(attachment(target, wgpu::LoadOp::Clear(colour)))],
-            ..Default::default()
-        }));
+        draw::clear(&mut encoder, target, [0.16, 0.20, 0.24]);
         self.gpu.queue.submit([encoder.finish()]);
     }
 
@@ -171,7 +159,7 @@ impl Paint {
         let mut commands = self.gui.update_buffers(device, queue, &mut encoder, &gui.primitives, &screen);
         let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("panel"),
-            color_attachments: &[Some(attachment(target, wgpu::LoadOp::Load))],
+            color_attachments: &[Some(draw::onto(target, wgpu::LoadOp::Load))],
             ..Default::default()
         });
         self.gui.render(&mut pass.forget_lifetime(), &gui.primitives, &screen);
@@ -204,9 +192,4 @@ impl Paint {
         let lines = bytes.chunks_exact(row as usize);
         Ok(lines.flat_map(|line| line[..4 * size.width as usize].chunks_exact(4).map(colour)).collect())
     }
-}
-
-fn attachment(view: &wgpu::TextureView, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPassColorAttachment<'_> {
-    let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
-    wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops }
 }

@@ -201,6 +201,13 @@ fn detail(ui: &mut Ui, cockpit: &mut Cockpit, asks: &mut Vec<Ask>) {
         let tolerance = Slider::new(&mut settings.tolerance_pixels, 0.1..=50.0).logarithmic(true);
         ui.add(tolerance.custom_formatter(|n, _| format!("{n:.2}")).text("px tolerance"));
         ui.add(Slider::new(&mut settings.triangles, 1000..=5_000_000).logarithmic(true).text("most triangles"));
+        ui.horizontal(|ui| {
+            for each in Style::ALL {
+                ui.selectable_value(&mut settings.style, each, each.words().0).on_hover_text(each.words().1);
+            }
+            let coarse = Slider::new(&mut settings.coarse, 1..=8).custom_formatter(|n, _| format!("1/{n:.0}"));
+            ui.add_enabled(settings.style == Style::Natural, coarse.text("of the pixels"));
+        });
         ui.horizontal(|ui| Show::ALL.map(|each| ui.selectable_value(&mut settings.show, each, each.name())));
         let mut frozen = cockpit.frozen.is_some();
         if ui.checkbox(&mut frozen, "Freeze the triangles (F)").changed() {
@@ -230,9 +237,6 @@ fn look(ui: &mut Ui, cockpit: &mut Cockpit) {
     section(ui, "Light and colours", false, |ui| {
         let own_sun = cockpit.own_sun();
         let settings = &mut cockpit.settings;
-        egui::ComboBox::from_id_salt("style").selected_text(settings.style.name()).show_ui(ui, |ui| {
-            Style::ALL.map(|each| ui.selectable_value(&mut settings.style, each, each.name()))
-        });
         if ui.checkbox(&mut settings.own_sun, "The sun where it suits the land").changed()
             && let Some(sun) = own_sun.filter(|_| !settings.own_sun)
         {

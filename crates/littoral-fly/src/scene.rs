@@ -6,13 +6,15 @@
 //! Everything that borrows the land (the stage, the sea's method, ROAM's bounds) lives on the stack of [`fly`], for as long as that land is flown over.
 
 use crate::chooser::Chooser;
+use crate::draw::Scenery;
+use crate::plain::sea_datum;
 use crate::settings::Method;
 use crate::subject::{Order, Subject};
-use glam::DVec2;
+use glam::{DVec2, UVec2};
 use littoral::field::Sea;
 use littoral::lod::{Mesh, NestedBounds, Reached};
 use littoral::picture::{self, Air, Border, Climate, Scene, Shot, Stage, Sun};
-use littoral::space::{Datum, View};
+use littoral::space::View;
 use littoral::waves::SeaState;
 use littoral_gpu::Gpu;
 use std::cell::OnceCell;
@@ -24,8 +26,6 @@ use std::time::{Duration, Instant};
 /// What decides the light and the colours: each change makes the stage anew.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// The style; `None` for what suits the land.
-    pub style: Option<picture::Style>,
     /// The sun; `None` for one that suits the land.
     pub sun: Option<Sun>,
     /// How far one sees (m); `None` for what suits the land.
@@ -47,6 +47,10 @@ pub struct Wish {
     pub triangles: usize,
     /// For which view, with its tolerance.
     pub view: View,
+    /// What the eye sees, in a picture of any size.
+    pub eye: View,
+    /// Whether waves are wanted as triangles.
+    pub waves: bool,
     /// The instant of the sea (s).
     pub time: f64,
     /// Where the water's height is asked for.
@@ -58,6 +62,8 @@ pub struct Wish {
 pub struct Frame {
     /// Which land they are of.
     pub serial: u64,
+    /// Which frame of that land it is.
+    pub number: u64,
     /// The view they were chosen for.
     pub view: View,
     /// The instant of the sea (s).
@@ -70,6 +76,8 @@ pub struct Frame {
     pub ground_reached: Reached,
     /// How well the water is drawn.
     pub water_reached: Option<Reached>,
+    /// The radiance that an eye there would take for middle grey (kcd/m²).
+    pub grey: f32,
     /// How long the choice took (ms).
     pub milliseconds: f64,
     /// Heights of the water (m) at the wish's probes.
@@ -96,7 +104,7 @@ pub enum News {
     /// Another land, and a good view of it.
     Arrived(Arc<Subject>, Box<Shot>, u64),
     /// The light and the colours of a land.
-    Scenery(Arc<crate::draw::Scenery>, u64),
+    Scenery(Scenery, u64),
     /// Meshes.
     Frame(Box<Frame>),
 }
@@ -265,20 +273,22 @@ fn fly(
         let mut waves: Option<Sea> = None;
         // What the waves are of, and what is being made.
         let mut state: Option<String> = None;
+        let mut number = 0;
         let mut making: Option<std::thread::ScopedJoinHandle<'_, Result<Sea, String>>> = None;
         loop {
             let look = wish.look;
             let scene = scene(subject, suits, &look);
             voice.working("lighting the land", 0.0);
             let stage = Stage::new(&scene);
-            let scenery = crate::draw::Scenery::new(gpu, &stage);
-            voice.tell(News::Scenery(Arc::new(scenery), serial));
+            let (scenery, problem) = Scenery::new(gpu, &stage, wish.eye.eye.z);
+            if let Some(problem) = problem {
+                voice.tell(News::Note(problem));
+            }
+            voice.tell(News::Scenery(scenery.clone(), serial));
             voice.idle();
             let bounds: OnceCell<Option<NestedBounds>> = OnceCell::new();
-            let mut still = subject.water.as_ref().map(|water| {
-                let (origin, size) = (subject.land.origin(), subject.land.extent());
-                Sea::new(Datum::Plane { origin, size }, water.level)
-            });
+            let mut meter = Meter::default();
+            let mut still = subject.water.as_ref().map(|water| Sea::new(sea_datum(&subject.land), water.level));
             let mut chooser = Chooser::new(stage.land(), &bounds, wish.method, wish.triangles);
             let mut answered: Option<Wish> = None;
             loop {
@@ -313,8 +323,11 @@ fn fly(
                 if answered.as_ref() != Some(&*wish) {
                     chooser.follow(wish.method, wish.triangles);
                     let sea = waves.as_mut().or(still.as_mut()).filter(|_| stage.shows_waves());
-                    match frame(&mut chooser, sea, wish, serial) {
-                        Ok(frame) => voice.tell(News::Frame(Box::new(frame))),
+                    scenery.see_from(gpu, &stage, wish.eye.eye.z);
+                    number += 1;
+                    let grey = meter.grey(&stage, &wish.eye);
+                    match frame(&mut chooser, sea, wish) {
+                        Ok(frame) => voice.tell(News::Frame(Box::new(Frame { serial, number, grey, ..frame }))),
                         Err(problem) => voice.tell(News::Note(problem)),
                     }
                     answered = Some(wish.clone());
@@ -329,7 +342,6 @@ fn fly(
 
 /// The scene of a land in a light.
 fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
-    let style = look.style.unwrap_or(suits.style);
     let air = match look.visibility {
         Some(visibility) => Air { visibility, veils_distance: true },
         None => suits.air,
@@ -339,7 +351,7 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
         lakes: subject.lakes.as_ref(),
         sun: look.sun.unwrap_or(suits.sun),
         air,
-        style,
+        style: picture::Style::Natural,
         // Whoever flies comes within, sooner or later.
         border: Border::Mist,
         climate,
@@ -363,16 +375,17 @@ fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Sea, String> {
 }
 
 /// The meshes that are wished for.
-fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish, serial: u64) -> Result<Frame, String> {
+fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish) -> Result<Frame, String> {
     let started = Instant::now();
-    let sea = sea.map(|sea| {
+    // Waves that nobody sees or feels cost nothing.
+    let sea = sea.filter(|_| wish.waves || wish.probes.is_some()).map(|sea| {
         if sea.time() != wish.time {
             sea.set_time(wish.time);
         }
         &*sea
     });
     let (ground, ground_reached) = chooser.ground(&wish.view).map_err(|e| e.to_string())?;
-    let water = sea.map(|sea| chooser.water(sea, &wish.view)).transpose().map_err(|e| e.to_string())?;
+    let water = sea.filter(|_| wish.waves).map(|sea| chooser.water(sea, &wish.view)).transpose().map_err(|e| e.to_string())?;
     let (water, water_reached) = water.unzip();
     let heights = sea.zip(wish.probes).map(|(sea, probes)| {
         let mut heights = [0.0; 4];
@@ -380,7 +393,9 @@ fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish, serial: u64)
         heights
     });
     Ok(Frame {
-        serial,
+        serial: 0,
+        number: 0,
+        grey: 0.0,
         view: wish.view,
         time: wish.time,
         ground,
@@ -390,4 +405,29 @@ fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish, serial: u64)
         milliseconds: started.elapsed().as_secs_f64() * 1e3,
         heights,
     })
+}
+
+/// Meters the light, as a photographer does: by a small picture of what is seen, now and then.
+#[derive(Default)]
+struct Meter {
+    last: Option<(f32, Instant)>,
+}
+
+impl Meter {
+    /// The radiance of middle grey (kcd/m²).
+    fn grey(&mut self, stage: &Stage<'_>, eye: &View) -> f32 {
+        const SIZE: UVec2 = UVec2::new(48, 27);
+        const EVERY: Duration = Duration::from_millis(900);
+        match self.last {
+            Some((grey, when)) if when.elapsed() < EVERY => grey,
+            _ => {
+                let pixels_per_radian = eye.pixels_per_radian * SIZE.y as f32 / eye.size.y.max(1) as f32;
+                let small = View { size: SIZE, pixels_per_radian, ..*eye };
+                let settings = picture::Settings { samples: 1, passes: false, ..picture::Settings::default() };
+                let grey = stage.render(&small, &settings, &|_| {}).grey().max(1e-6);
+                self.last = Some((grey, Instant::now()));
+                grey
+            }
+        }
+    }
 }

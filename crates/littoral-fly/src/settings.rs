@@ -2,7 +2,6 @@
 
 use crate::camera::Mode;
 use littoral::lod::{Limits, Lod, Nested, Patches, Quadtree, Roam, Strips, Whole};
-use littoral::picture;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -55,42 +54,26 @@ impl Method {
     }
 }
 
-/// How the ground is coloured.
+/// How the picture is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
-    /// What suits the land.
+    /// In the light of the data: every pixel is lit once, whatever the triangles.
     #[default]
-    Own,
-    /// Rock, scree, grass, woods, sand and snow.
     Natural,
-    /// Colours by height.
-    Tint,
-    /// A cartographer's shaded relief.
-    Relief,
+    /// The triangles themselves, flatly lit; waves are triangles, too.
+    Plain,
 }
 
 impl Style {
     /// All of them.
-    pub const ALL: [Style; 4] = [Style::Own, Style::Natural, Style::Tint, Style::Relief];
+    pub const ALL: [Style; 2] = [Style::Natural, Style::Plain];
 
-    /// What it is called.
-    pub fn name(self) -> &'static str {
+    /// What it is called, and what it does.
+    pub fn words(self) -> (&'static str, &'static str) {
         match self {
-            Style::Own => "By itself",
-            Style::Natural => "Natural",
-            Style::Tint => "Tint",
-            Style::Relief => "Relief",
-        }
-    }
-
-    /// The picture's style, if one is named.
-    pub fn picture(self) -> Option<picture::Style> {
-        match self {
-            Style::Own => None,
-            Style::Natural => Some(picture::Style::Natural),
-            Style::Tint => Some(picture::Style::Tint),
-            Style::Relief => Some(picture::Style::Relief),
+            Style::Natural => ("Natural", "Rock, scree, grass, woods, sand and snow in the light of the day; water lies still"),
+            Style::Plain => ("Plain", "The triangles themselves, flatly lit, waves as well: quick without a graphics card"),
         }
     }
 }
@@ -134,8 +117,10 @@ pub struct Settings {
     pub tolerance_pixels: f64,
     /// The most triangles of the ground, and as many of the sea.
     pub triangles: u32,
-    /// How the ground is coloured.
+    /// How the picture is drawn.
     pub style: Style,
+    /// One pixel of light for so many of the window's, each way.
+    pub coarse: u32,
     /// Textured, wireframe or both.
     pub show: Show,
     /// Whether the sun stands where it suits the land, and not where it was put.
@@ -175,6 +160,7 @@ impl Default for Settings {
             tolerance_pixels: 1.0,
             triangles: 150_000,
             style: Style::default(),
+            coarse: 1,
             show: Show::default(),
             own_sun: true,
             sun_azimuth_degrees: 240.0,
@@ -241,6 +227,10 @@ impl Settings {
             self.triangles = usual.triangles;
             wrong.push("triangles");
         }
+        if !(1..=8).contains(&self.coarse) {
+            self.coarse = usual.coarse;
+            wrong.push("coarse");
+        }
         let message = (!wrong.is_empty())
             .then(|| format!("{}: {} out of range; the usual taken", file.display(), wrong.join(", ")));
         (self, message)
@@ -269,7 +259,7 @@ mod tests {
         let settings = Settings {
             method: Method::Roam,
             show: Show::Both,
-            style: Style::Tint,
+            style: Style::Plain,
             sea: "wind=14,from=300".into(),
             exaggeration: 2.5,
             mode: Mode::Boat,

@@ -130,6 +130,10 @@ impl Flight {
         context.set_theme(egui::Theme::Dark);
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &window, None, None, None);
         let mut cockpit = Cockpit::new(app.settings.clone(), arguments.files.clone());
+        if paint.gpu.is_software() && arguments.coarse.is_none() && cockpit.settings.coarse == 1 {
+            // Without a graphics card, light for every pixel of a window takes too long.
+            cockpit.settings.coarse = 3;
+        }
         if let Some(note) = app.note.take() {
             cockpit.note(note);
         }
