@@ -118,11 +118,8 @@ impl Boat {
         let [bow, stern, port, starboard] = heights;
         if heights.iter().all(|h| h.is_finite()) {
             let mean = 0.25 * heights.iter().sum::<f64>();
-            self.water = DVec3::new(
-                mean,
-                ((bow - stern) / (2.0 * HULL.y)).atan(),
-                ((port - starboard) / (2.0 * HULL.x)).atan(),
-            );
+            self.water =
+                DVec3::new(mean, ((bow - stern) / (2.0 * HULL.y)).atan(), ((port - starboard) / (2.0 * HULL.x)).atan());
         }
     }
 
@@ -366,7 +363,11 @@ impl Camera {
         boat.heading = (boat.heading + turned).rem_euclid(TAU);
         self.bearing = (self.bearing + turned).rem_euclid(TAU);
         let next = boat.at + ahead(boat.heading) * boat.speed * dt;
-        if world.depth(next) > DRAUGHT { boat.at = next } else { boat.speed = 0.0 }
+        if world.depth(next) > DRAUGHT {
+            boat.at = next
+        } else {
+            boat.speed = 0.0
+        }
         let left = (-dt / 0.2).exp();
         boat.lie = boat.water + (boat.lie - boat.water) * left;
         self.board();
@@ -400,12 +401,7 @@ impl Camera {
 }
 
 /// The nearest place from `at` outward that has what is wanted, what is looked at being asked first if it is within sight.
-fn near(
-    at: DVec2,
-    seen: Option<DVec3>,
-    bounds: [DVec2; 2],
-    has: impl Fn(DVec2) -> Option<DVec2>,
-) -> Option<DVec2> {
+fn near(at: DVec2, seen: Option<DVec3>, bounds: [DVec2; 2], has: impl Fn(DVec2) -> Option<DVec2>) -> Option<DVec2> {
     const RINGS: u32 = 64;
     let extent = (bounds[1] - bounds[0]).length();
     let inside = at.clamp(bounds[0], bounds[1]);

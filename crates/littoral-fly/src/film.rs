@@ -29,7 +29,8 @@ impl Filming {
     /// A film along the cockpit's path, into the first name that is free.
     pub fn new(cockpit: &Cockpit, size: UVec2) -> Result<Filming, String> {
         let subject = cockpit.subject.as_ref().ok_or("nothing is open yet: wait for the land")?;
-        let tape = Tape::of(cockpit.editor.path(), subject, RATE).map_err(|problem| format!("no film yet: {problem}"))?;
+        let tape =
+            Tape::of(cockpit.editor.path(), subject, RATE).map_err(|problem| format!("no film yet: {problem}"))?;
         let frames = (tape.duration() * RATE).round().max(1.0) as usize;
         let settings = FilmSettings { width: size.x, height: size.y, rate: RATE };
         let ending = if ffmpeg_installed() { ".mp4" } else { "" };
@@ -85,7 +86,9 @@ impl Filming {
         *time = self.begin;
         let named = |out: &Path| format!("film of {} frames in {}", self.frame, out.display());
         match self.sink.take() {
-            Some(Sink::Film(film)) if self.frame > 0 => film.finish().map_or_else(|e| e.to_string(), |()| named(&self.out)),
+            Some(Sink::Film(film)) if self.frame > 0 => {
+                film.finish().map_or_else(|e| e.to_string(), |()| named(&self.out))
+            }
             Some(Sink::Folder(folder)) => format!("{}; join them with: {}", named(&self.out), folder.how_to_join()),
             _ => "no film: it ended before its first frame".to_owned(),
         }

@@ -33,7 +33,11 @@ use std::process::ExitCode;
 /// Without FILE the built-in coast is opened. Files can also be dropped on the window: height files become the land, a path's file (.toml) is
 /// loaded. Settings are remembered from flight to flight.
 #[derive(Parser)]
-#[command(name = "littoral-fly", version, max_term_width = 100, after_help = "Examples:
+#[command(
+    name = "littoral-fly",
+    version,
+    max_term_width = 100,
+    after_help = "Examples:
   littoral-fly                                 the built-in coast
   littoral-fly dem.tif                         your land
   littoral-fly N45W122.hgt N46W122.hgt         files that join, as one land
@@ -44,7 +48,8 @@ use std::process::ExitCode;
 
 In the window: W S A D and the mouse fly, the wheel sets the speed, F1 lists all keys. F12 saves
 a picture, R films the path; both go into the folder the program was started in.
-Exit codes: 0 done, 1 no display, no graphics adapter or lost, 2 the command line was wrong.")]
+Exit codes: 0 done, 1 no display, no graphics adapter or lost, 2 the command line was wrong."
+)]
 struct Arguments {
     /// Height files of any known format: several that lie beside each other are one land; none for the built-in coast
     #[arg(value_name = "FILE")]
@@ -161,9 +166,13 @@ mod tests {
     #[test]
     fn the_command_line_holds_together() {
         Arguments::command().debug_assert();
-        let arguments = Arguments::try_parse_from(["littoral-fly", "--method", "Roam", "--smoke", "5", "--sea", "calm"]);
+        let arguments =
+            Arguments::try_parse_from(["littoral-fly", "--method", "Roam", "--smoke", "5", "--sea", "calm"]);
         let (settings, note) = arguments.expect("parses").settings();
-        assert_eq!(settings, Settings { method: Method::Roam, waves: false, sea: "calm".into(), ..Settings::default() });
+        assert_eq!(
+            settings,
+            Settings { method: Method::Roam, waves: false, sea: "calm".into(), ..Settings::default() }
+        );
         assert_eq!(note, None);
         for wrong in [["--method", "rome"], ["--size", "7"], ["--tolerance", "0"], ["--smoke", "0"]] {
             let error = Arguments::try_parse_from(["littoral-fly", wrong[0], wrong[1]]).map(|_| ()).expect_err("wrong");

@@ -154,7 +154,8 @@ impl Paint {
     /// Paints the panel.
     fn over(&mut self, gui: &Gui, target: &wgpu::TextureView) {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        let screen = egui_wgpu::ScreenDescriptor { size_in_pixels: self.size().to_array(), pixels_per_point: gui.scale };
+        let screen =
+            egui_wgpu::ScreenDescriptor { size_in_pixels: self.size().to_array(), pixels_per_point: gui.scale };
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut commands = self.gui.update_buffers(device, queue, &mut encoder, &gui.primitives, &screen);
         let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -184,10 +185,12 @@ impl Paint {
         encoder.copy_texture_to_buffer(texture.as_image_copy(), into, size);
         self.gpu.queue.submit([encoder.finish()]);
         buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-        let problem = |e: &dyn std::fmt::Display| format!("the picture could not be read back from the graphics card: {e}");
+        let problem =
+            |e: &dyn std::fmt::Display| format!("the picture could not be read back from the graphics card: {e}");
         self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| problem(&e))?;
         let bytes = buffer.slice(..).get_mapped_range().map_err(|e| problem(&e))?;
-        let blue_first = matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
+        let blue_first =
+            matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
         let colour = |p: &[u8]| if blue_first { [p[2], p[1], p[0]] } else { [p[0], p[1], p[2]] };
         let lines = bytes.chunks_exact(row as usize);
         Ok(lines.flat_map(|line| line[..4 * size.width as usize].chunks_exact(4).map(colour)).collect())

@@ -112,7 +112,7 @@ fn status(ui: &mut Ui, cockpit: &Cockpit) {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 14.0;
             let history = &cockpit.history;
-            let milliseconds = median(history.frame.iter().rev().take(30).copied());
+            let milliseconds = median(history.frame.iter().rev().take(12).copied());
             ui.label(format!("{:.0} frames/s", if milliseconds > 0.0 { 1000.0 / milliseconds } else { 0.0 }));
             if let Some(frame) = &cockpit.frame {
                 ui.label(format!("{} in {:.1} ms", cockpit.settings.method.words().0, frame.milliseconds));
@@ -205,9 +205,11 @@ fn detail(ui: &mut Ui, cockpit: &mut Cockpit, asks: &mut Vec<Ask>) {
             for each in Style::ALL {
                 ui.selectable_value(&mut settings.style, each, each.words().0).on_hover_text(each.words().1);
             }
-            let coarse = Slider::new(&mut settings.coarse, 1..=8).custom_formatter(|n, _| format!("1/{n:.0}"));
-            ui.add_enabled(settings.style == Style::Natural, coarse.text("of the pixels"));
         });
+        if settings.style == Style::Natural {
+            let coarse = Slider::new(&mut settings.coarse, 1..=8).custom_formatter(|n, _| format!("1/{n:.0}"));
+            ui.add(coarse.text("sharpness")).on_hover_text("One pixel of light for so many of the window's, each way");
+        }
         ui.horizontal(|ui| Show::ALL.map(|each| ui.selectable_value(&mut settings.show, each, each.name())));
         let mut frozen = cockpit.frozen.is_some();
         if ui.checkbox(&mut frozen, "Freeze the triangles (F)").changed() {
@@ -289,6 +291,10 @@ fn sea(ui: &mut Ui, cockpit: &mut Cockpit) {
                 ui.checkbox(&mut cockpit.still, "stand still");
             });
             ui.label(RichText::new(format!("at {:.1} s", cockpit.time)).weak());
+            if cockpit.settings.style == Style::Natural {
+                let words = "Waves carry the boat; they are seen in plain pictures only (Detail).";
+                ui.label(RichText::new(words).weak().small());
+            }
         });
     });
 }

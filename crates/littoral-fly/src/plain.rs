@@ -23,12 +23,7 @@ impl Scenery {
     pub fn new(stage: &Stage<'_>) -> Scenery {
         let land = stage.land();
         let range = land.height_range();
-        Scenery {
-            ground: land.datum(),
-            water: sea_datum(land),
-            low: range.low,
-            high: range.high,
-        }
+        Scenery { ground: land.datum(), water: sea_datum(land), low: range.low, high: range.high }
     }
 }
 

@@ -48,7 +48,7 @@ fn plot(ui: &mut Ui, name: &str, unit: &str, values: &VecDeque<f32>, colour: Col
         .collect();
     painter.line(points, Stroke::new(1.2, colour));
     let font = FontId::proportional(10.5);
-    let now = median(finite());
+    let now = median(values.iter().rev().take(12).copied());
     painter.text(rect.left_top() + egui::vec2(4.0, 2.0), Align2::LEFT_TOP, name, font.clone(), Color32::WHITE);
     let text = format!("{}{unit}  (to {})", words(now), words(top));
     painter.text(rect.right_top() + egui::vec2(-4.0, 2.0), Align2::RIGHT_TOP, text, font, Color32::LIGHT_GRAY);

@@ -316,7 +316,9 @@ fn fly(
                     match made.join() {
                         Ok(Ok(sea)) => waves = Some(sea),
                         Ok(Err(problem)) => voice.tell(News::Note(problem)),
-                        Err(_) => voice.tell(News::Note("the waves could not be made (an internal error; please report it)".into())),
+                        Err(_) => voice.tell(News::Note(
+                            "the waves could not be made (an internal error; please report it)".into(),
+                        )),
                     }
                     answered = None;
                 }
@@ -362,7 +364,8 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
 
 /// The sea of a state as typed.
 fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Sea, String> {
-    let wrong = |problem: String| format!("sea state \"{text}\": {problem}; correct it, for example: beaufort=4,from=225");
+    let wrong =
+        |problem: String| format!("sea state \"{text}\": {problem}; correct it, for example: beaufort=4,from=225");
     let state: SeaState = text.parse().map_err(|e: littoral::waves::spec::SpecError| wrong(e.to_string()))?;
     let Some(water) = &subject.water else { return Err("there is no water here for waves".into()) };
     // Bearings count from true north, headings from the land's x axis.
@@ -385,7 +388,8 @@ fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish) -> Result<Fr
         &*sea
     });
     let (ground, ground_reached) = chooser.ground(&wish.view).map_err(|e| e.to_string())?;
-    let water = sea.filter(|_| wish.waves).map(|sea| chooser.water(sea, &wish.view)).transpose().map_err(|e| e.to_string())?;
+    let water =
+        sea.filter(|_| wish.waves).map(|sea| chooser.water(sea, &wish.view)).transpose().map_err(|e| e.to_string())?;
     let (water, water_reached) = water.unzip();
     let heights = sea.zip(wish.probes).map(|(sea, probes)| {
         let mut heights = [0.0; 4];

@@ -37,7 +37,9 @@ impl Method {
             Method::Quadtree => ("Quadtree", "A restricted quadtree whose patches morph"),
             Method::Patches => ("Patches", "Triangles cut level by level, edges deciding"),
             Method::Strips => ("Strips", "Strips along rows whose cells change size on the way"),
-            Method::Roam => ("ROAM", "A bintree of right triangles, the worst split first; it goes on from frame to frame"),
+            Method::Roam => {
+                ("ROAM", "A bintree of right triangles, the worst split first; it goes on from frame to frame")
+            }
         }
     }
 
@@ -72,8 +74,12 @@ impl Style {
     /// What it is called, and what it does.
     pub fn words(self) -> (&'static str, &'static str) {
         match self {
-            Style::Natural => ("Natural", "Rock, scree, grass, woods, sand and snow in the light of the day; water lies still"),
-            Style::Plain => ("Plain", "The triangles themselves, flatly lit, waves as well: quick without a graphics card"),
+            Style::Natural => {
+                ("Natural", "Rock, scree, grass, woods, sand and snow in the light of the day; water lies still")
+            }
+            Style::Plain => {
+                ("Plain", "The triangles themselves, flatly lit, waves as well: quick without a graphics card")
+            }
         }
     }
 }

@@ -51,7 +51,13 @@ impl Subject {
         let files = &order.files;
         let (name, land, georeference, datum, notes) = if files.is_empty() {
             told("making the built-in coast", 0.0);
-            ("the built-in coast".to_owned(), coast::coast(), None, "heights above its sea level".to_owned(), Vec::new())
+            (
+                "the built-in coast".to_owned(),
+                coast::coast(),
+                None,
+                "heights above its sea level".to_owned(),
+                Vec::new(),
+            )
         } else {
             let name = littoral_data::name_of_all(files);
             let mut source = littoral_data::open_all(files, None).map_err(|e| e.to_string())?;
@@ -177,7 +183,9 @@ impl Subject {
         };
         let path = saved.placed(local).map_err(|point| {
             let (file, name) = (file.display(), &self.name);
-            format!("{file}: point {point}: expected coordinates that {name} can place, got others; change \"coordinates\"")
+            format!(
+                "{file}: point {point}: expected coordinates that {name} can place, got others; change \"coordinates\""
+            )
         })?;
         Ok(path.stretched(self.order.exaggeration))
     }

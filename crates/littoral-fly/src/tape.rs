@@ -28,7 +28,10 @@ impl Tape {
         let flight = path.over(&ground).map_err(|e| e.to_string())?;
         let (duration, count) = (flight.duration(), (flight.duration() * rate).ceil() + 1.0);
         if count > Tape::MOST {
-            return Err(format!("expected a flight of at most {:.0} s, got {duration:.0} s; fly faster", Tape::MOST / rate));
+            return Err(format!(
+                "expected a flight of at most {:.0} s, got {duration:.0} s; fly faster",
+                Tape::MOST / rate
+            ));
         }
         let poses = (0..count as usize).map(|i| flight.pose(i as f64 / rate)).collect();
         Ok(Tape { poses, rate, duration, length: flight.length(), closed: path.closed })

@@ -29,7 +29,8 @@ pub fn run(arguments: Arguments, settings: Settings, note: Option<String>) -> Re
     let no_display = |e: &dyn std::fmt::Display| {
         // "os error at FILE:LINE: what went wrong"
         let text = e.to_string().replace('\n', " ");
-        let what = text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, what)| what);
+        let what =
+            text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, what)| what);
         let what = what.trim_end_matches('.');
         format!(
             "expected a display to open a window on, found none ({what}); start it in a desktop session, set DISPLAY or WAYLAND_DISPLAY, or draw without a window: littoral render"
@@ -239,7 +240,8 @@ impl Flight {
         if self.scene.as_ref().is_some_and(JoinHandle::is_finished) {
             self.scene = None;
             self.cockpit.working = None;
-            self.cockpit.note("the scene stopped (an internal error; please report it): save your path, and start again");
+            self.cockpit
+                .note("the scene stopped (an internal error; please report it): save your path, and start again");
         }
     }
 
@@ -302,9 +304,10 @@ impl Flight {
         let size = self.paint.size();
         let name = self.cockpit.subject.as_ref().map_or(String::new(), |subject| subject.name.clone());
         let notes = [("Software", "littoral-fly".to_owned()), ("Source", name)];
-        let saved = self.paint.copy(&self.cockpit, gui).and_then(|pixels| {
-            png(&file, size.x, size.y, PngPixels::Rgb8(&pixels), &notes).map_err(|e| e.to_string())
-        });
+        let saved = self
+            .paint
+            .copy(&self.cockpit, gui)
+            .and_then(|pixels| png(&file, size.x, size.y, PngPixels::Rgb8(&pixels), &notes).map_err(|e| e.to_string()));
         self.cockpit.note(match saved {
             Ok(()) => format!("picture saved in {}", file.display()),
             Err(problem) => problem,

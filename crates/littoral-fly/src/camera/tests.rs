@@ -19,7 +19,8 @@ fn sixty_steps_are_thirty_twice_as_long() {
     for mode in Mode::ALL {
         let mut camera = start.clone();
         slope(false, |world| camera.change(mode, Some(DVec3::new(-500.0, 50.0, 0.0)), world).expect("possible"));
-        let (often, seldom) = (flown(camera.clone(), hands, 60, 1.0 / 60.0), flown(camera.clone(), hands, 30, 1.0 / 30.0));
+        let (often, seldom) =
+            (flown(camera.clone(), hands, 60, 1.0 / 60.0), flown(camera.clone(), hands, 30, 1.0 / 30.0));
         let way = (often.eye - camera.eye).length();
         assert!(way > 1.0, "{mode:?} moves: {way}");
         assert!((often.eye - seldom.eye).length() < 1e-6 * way, "{mode:?}: {} and {}", often.eye, seldom.eye);
@@ -115,12 +116,8 @@ fn boats_float_lean_and_run_aground() {
 
 #[test]
 fn where_nothing_carries_it_stays_what_it_was() {
-    let dry = World {
-        ground: &|_| Some(5.0),
-        water: &|_| None,
-        bounds: [DVec2::ZERO, DVec2::splat(10.0)],
-        below: false,
-    };
+    let dry =
+        World { ground: &|_| Some(5.0), water: &|_| None, bounds: [DVec2::ZERO, DVec2::splat(10.0)], below: false };
     let mut camera = Camera::new(DVec3::new(1.0, 1.0, 50.0), DVec3::Y);
     let refused = camera.change(Mode::Boat, None, &dry).expect_err("no water");
     assert!(refused.contains("water"), "{refused}");
