@@ -2,6 +2,7 @@
 
 use crate::cockpit::Cockpit;
 use crate::draw;
+use crate::settings::Settings;
 use glam::UVec2;
 use littoral_gpu::Gpu;
 use std::sync::Arc;
@@ -98,7 +99,7 @@ impl Paint {
             }
         };
         let target = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
-        self.picture(cockpit, &target);
+        self.picture(cockpit, &target, cockpit.settings.coarse);
         self.over(gui, &target);
         self.gpu.queue.present(texture);
         Ok(())
@@ -117,7 +118,7 @@ impl Paint {
         gui.textures.clear();
     }
 
-    /// The picture as it is seen now, red, green and blue, with the panel if that is given.
+    /// The picture as it is seen now, as sharp as can be, red, green and blue, with the panel if that is given.
     pub fn copy(&mut self, cockpit: &Cockpit, gui: Option<&Gui>) -> Result<Vec<[u8; 3]>, String> {
         let size = self.size();
         let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -131,19 +132,19 @@ impl Paint {
             view_formats: &[],
         });
         let target = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        self.picture(cockpit, &target);
+        self.picture(cockpit, &target, 1);
         if let Some(gui) = gui {
             self.over(gui, &target);
         }
         self.pixels(&texture)
     }
 
-    fn picture(&mut self, cockpit: &Cockpit, target: &wgpu::TextureView) {
+    fn picture(&mut self, cockpit: &Cockpit, target: &wgpu::TextureView, coarse: u32) {
         let size = self.size();
         if let (Some(scenery), Some(frame)) = (&cockpit.scenery, &cockpit.frame) {
             let view = |size| cockpit.view(size);
-            let (settings, grey) = (&cockpit.settings, cockpit.grey());
-            return self.renderer.draw(&self.gpu, scenery, frame, settings, grey, &view, target, size);
+            let settings = Settings { coarse, ..cockpit.settings.clone() };
+            return self.renderer.draw(&self.gpu, scenery, frame, &settings, cockpit.grey(), &view, target, size);
         }
         // Nothing to see yet.
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

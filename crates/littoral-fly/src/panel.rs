@@ -34,10 +34,7 @@ pub struct Shown {
 
 /// Everything over the picture.
 pub fn show(ui: &mut Ui, cockpit: &mut Cockpit, shown: &mut Shown, size: UVec2, asks: &mut Vec<Ask>) {
-    // Over pictures of any colour, text must be bright.
-    let visuals = ui.visuals_mut();
-    visuals.override_text_color = Some(Color32::from_gray(225));
-    visuals.weak_text_color = Some(Color32::from_gray(165));
+    overlay(ui, cockpit, size);
     status(ui, cockpit);
     if cockpit.settings.panel {
         let frame = egui::Frame::side_top_panel(ui.style()).fill(Color32::from_black_alpha(215));
@@ -46,7 +43,6 @@ pub fn show(ui: &mut Ui, cockpit: &mut Cockpit, shown: &mut Shown, size: UVec2, 
         });
     }
     let rest = ui.available_rect_before_wrap();
-    overlay(ui, cockpit, size);
     notes(ui, cockpit, rest);
     if let Some((done, all)) = shown.film {
         let text = format!("filming: {done} of {all} frames; R stops");

@@ -259,6 +259,7 @@ impl Opening {
 }
 
 /// Flies over a land until another one is open. `suits` is a view with the light that suits it.
+#[allow(clippy::too_many_arguments, reason = "what is flown over, what is wished for, and whom to tell")]
 fn fly(
     subject: &Subject,
     suits: &Shot,

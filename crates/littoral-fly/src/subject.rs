@@ -111,7 +111,7 @@ impl Subject {
     pub fn still_water(&self, at: DVec2) -> Option<f64> {
         let sea = self.water.as_ref().filter(|water| water.covers(at)).map(|water| water.level);
         let sea = sea.filter(|level| self.ground(at).is_none_or(|ground| ground < *level));
-        sea.or_else(|| self.lakes.as_ref()?.at(&self.land, at).map(|lake| f64::from(lake.level)))
+        sea.or_else(|| self.lakes.as_ref()?.at(&self.land, at).map(|lake| lake.level))
     }
 
     /// Height of ground or still water (m, stretched), whichever is higher.

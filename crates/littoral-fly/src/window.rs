@@ -129,6 +129,11 @@ impl Flight {
         }
         let context = egui::Context::default();
         context.set_theme(egui::Theme::Dark);
+        // Over pictures of any colour, text must be bright.
+        let mut visuals = egui::Visuals::dark();
+        visuals.override_text_color = Some(egui::Color32::from_gray(225));
+        visuals.weak_text_color = Some(egui::Color32::from_gray(165));
+        context.set_visuals_of(egui::Theme::Dark, visuals);
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &window, None, None, None);
         let mut cockpit = Cockpit::new(app.settings.clone(), arguments.files.clone());
         if paint.gpu.is_software() && arguments.coarse.is_none() && cockpit.settings.coarse == 1 {
