@@ -247,6 +247,16 @@ impl Cockpit {
         View { tolerance_pixels: self.settings.tolerance_pixels as f32, ..view }
     }
 
+    /// Whether waves are drawn.
+    fn shows_waves(&self) -> bool {
+        self.settings.style == Style::Plain
+    }
+
+    /// The instant of the sea that is wished for (s): a sea that is neither seen nor felt stands still.
+    pub fn sea_time(&self) -> f64 {
+        if self.shows_waves() || self.camera.mode() == Mode::Boat { self.time } else { 0.0 }
+    }
+
     /// What is wished for, in a picture of this size.
     pub fn wish(&self, size: UVec2) -> Wish {
         let settings = &self.settings;
@@ -261,8 +271,8 @@ impl Cockpit {
             triangles: settings.triangles as usize,
             view: self.lod_view(size),
             eye: self.view(size),
-            waves: settings.style == Style::Plain,
-            time: self.time,
+            waves: self.shows_waves(),
+            time: self.sea_time(),
             probes: (self.camera.mode() == Mode::Boat).then(|| self.camera.boat.probes()),
         }
     }

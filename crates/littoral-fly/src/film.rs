@@ -61,7 +61,7 @@ impl Filming {
         if size != self.size {
             return Err("the window changed its size: the film ends here".into());
         }
-        let wanted = (cockpit.lod_view(size), cockpit.time);
+        let wanted = (cockpit.lod_view(size), cockpit.sea_time());
         Ok(cockpit.scenery.is_some() && cockpit.frame.as_ref().is_some_and(|f| (f.view, f.time) == wanted))
     }
 

@@ -72,7 +72,7 @@ struct Arguments {
     /// How the picture is drawn: in the light of the data, or as the triangles themselves
     #[arg(long, value_parser = named::<Style>, value_name = "natural|plain")]
     style: Option<Style>,
-    /// One pixel of light for so many of the window's, each way: natural pictures without a graphics card [default: 1; 3 without a graphics card]
+    /// One pixel of light for so many of the window's, each way: natural pictures without a graphics card [default: 1; 4 without a graphics card]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8))]
     coarse: Option<u32>,
     /// What is seen of the mesh

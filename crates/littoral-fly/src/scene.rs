@@ -289,6 +289,8 @@ fn fly(
             voice.idle();
             let bounds: OnceCell<Option<NestedBounds>> = OnceCell::new();
             let mut meter = Meter::default();
+            // How long the last sky took, and when it was done.
+            let mut sky = (Duration::ZERO, Instant::now());
             let mut still = subject.water.as_ref().map(|water| Sea::new(sea_datum(&subject.land), water.level));
             let mut chooser = Chooser::new(stage.land(), &bounds, wish.method, wish.triangles);
             let mut answered: Option<Wish> = None;
@@ -323,10 +325,15 @@ fn fly(
                     }
                     answered = None;
                 }
+                // A sky takes long: no more than a quarter of the time is spent on skies.
+                if sky.1.elapsed() > 3 * sky.0 {
+                    let begun = Instant::now();
+                    scenery.see_from(gpu, &stage, wish.eye.eye.z);
+                    sky = (begun.elapsed(), Instant::now());
+                }
                 if answered.as_ref() != Some(&*wish) {
                     chooser.follow(wish.method, wish.triangles);
                     let sea = waves.as_mut().or(still.as_mut()).filter(|_| stage.shows_waves());
-                    scenery.see_from(gpu, &stage, wish.eye.eye.z);
                     number += 1;
                     let grey = meter.grey(&stage, &wish.eye);
                     match frame(&mut chooser, sea, wish) {

@@ -138,7 +138,7 @@ impl Flight {
         let mut cockpit = Cockpit::new(app.settings.clone(), arguments.files.clone());
         if paint.gpu.is_software() && arguments.coarse.is_none() && cockpit.settings.coarse == 1 {
             // Without a graphics card, light for every pixel of a window takes too long.
-            cockpit.settings.coarse = 3;
+            cockpit.settings.coarse = 4;
         }
         if let Some(note) = app.note.take() {
             cockpit.note(note);
