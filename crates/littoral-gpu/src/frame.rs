@@ -42,6 +42,8 @@ pub(crate) struct Uniforms {
     skylight: [f32; 4],
     mist: [f32; 4],
     climate: [f32; 4],
+    block: [f32; 4],
+    floor: [f32; 4],
     open: [[f32; 4]; 9],
     noise: [Noise; NOISES],
 }
@@ -150,6 +152,10 @@ impl Uniforms {
             skylight: place(scenery.skylight_origin, scenery.skylight_spacing),
             mist: four(scenery.mist.0, (scenery.mist.1 - eye.z) as f32),
             climate: [scenery.lines[0], scenery.lines[1], 60_000.0, (0.06 * eye.x + 0.03 * eye.y) as f32],
+            block: scenery.block.map_or([0.0; 4], |block| pair(block.low - flat, block.high - flat)),
+            floor: scenery.block.map_or([0.0; 4], |block| {
+                [(block.floor - eye.z) as f32, block.thickness as f32, 1.0, flag(scenery.is_cut_away)]
+            }),
             open: scenery.open.map(|light| four(light, 0.0)),
             noise,
         }

@@ -44,6 +44,10 @@ struct Frame {
     mist: vec4f,
     // Tree line and snow line (m); greatest height of the eye in the sky's table (m).
     climate: vec4f,
+    // The block's rectangle from the eye (m).
+    block: vec4f,
+    // Its floor over the eye (m), its thickness (m), whether there is one, whether any of it is cut away.
+    floor: vec4f,
     // Harmonics of the light over an open plain.
     open: array<vec4f, 9>,
     noise: array<Noise, 56>,

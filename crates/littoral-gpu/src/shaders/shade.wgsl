@@ -163,17 +163,40 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
     var rel = across * (frame.corner.w / max(depth, 1e-12));
     var distance = select(length(rel), 1e30, depth == 0.0);
     var is_water = false;
+    if has_block() {
+        let wall = wall_of(vec3f(0.0), direction);
+        if wall.distance > 0.0 && wall.distance < distance * (1.0 + 1e-4) {
+            return through_air(direction, direction * wall.distance, wall.distance, wall_seen(wall, direction));
+        }
+    }
     let rise = -frame.water.x;
     if frame.water.y > 0.0 && rise > 0.0 && direction.z < 0.0 {
         var t = -rise / direction.z;
         let at = direction.xy * t;
         if any(at < frame.land.xy) || any(at > frame.land.zw) {
-            t = curved(rise, direction);
+            t = select(curved(rise, direction), -1.0, has_block());
         }
         if t > 0.0 && t <= distance * (1.0 + 1e-6) && covers(direction.xy * t) {
             is_water = true;
             distance = t;
             rel = direction * t;
+        }
+    }
+    if !is_water && has_block() {
+        let is_ground = distance < 1e29;
+        if is_ground && is_side(rel.xy) {
+            if rel.z < frame.floor.x + 0.01 * frame.floor.y {
+                return through_air(direction, rel, distance, floor_seen(rel));
+            }
+            let side = Wall(distance, outward(rel.xy), rel.z, rel.z, rel.xy);
+            return through_air(direction, rel, distance, wall_seen(side, direction));
+        }
+        if !is_ground {
+            let t = frame.floor.x / direction.z;
+            if direction.z >= 0.0 || t <= 0.0 {
+                return vec4f(sky_seen(direction), 0.0);
+            }
+            return through_air(direction, direction * t, t, floor_seen(direction * t));
         }
     }
     if !is_water && distance > 1e29 {
@@ -224,15 +247,20 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
     if is_water {
         light = water_seen(water, direction, rel, bed, mirrored_land);
     }
-    if frame.disc.w > 0.0 {
-        var through = distance;
-        if frame.eye.z > frame.climate.z {
-            through = min(through, (frame.climate.z - (frame.eye.z + rel.z)) / max(-direction.z, 1e-3));
-        }
-        let air = veil(direction, through);
-        light = light * air.through + air.light;
+    return through_air(direction, rel, distance, light);
+}
+
+// Light as it arrives at the eye, and from how far.
+fn through_air(direction: vec3f, rel: vec3f, distance: f32, light: vec3f) -> vec4f {
+    if frame.disc.w == 0.0 {
+        return vec4f(light, distance);
     }
-    return vec4f(light, distance);
+    var through = distance;
+    if frame.eye.z > frame.climate.z {
+        through = min(through, (frame.climate.z - (frame.eye.z + rel.z)) / max(-direction.z, 1e-3));
+    }
+    let air = veil(direction, through);
+    return vec4f(light * air.through + air.light, distance);
 }
 
 // The light that water sends, over a bed that throws back `bed`.
