@@ -1,0 +1,107 @@
+//! A device for those who have none.
+
+use std::fmt::Write;
+
+/// A device and its queue.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    /// Makes resources.
+    pub device: wgpu::Device,
+    /// Takes work.
+    pub queue: wgpu::Queue,
+    /// What does the work.
+    pub adapter: wgpu::AdapterInfo,
+}
+
+/// Why there is no device.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// Nothing that could draw was found.
+    #[error(
+        "expected a graphics adapter, found none ({tried}); install the driver of the graphics card, or Mesa's software Vulkan (Debian: mesa-vulkan-drivers)"
+    )]
+    NoAdapter {
+        /// What was tried, and how it failed.
+        tried: String,
+    },
+    /// The adapter lacks what is needed.
+    #[error("expected {wanted}, but {adapter} offers {offered}; choose another adapter, or draw on the processor")]
+    TooLittle {
+        /// The adapter's name.
+        adapter: String,
+        /// What is needed.
+        wanted: String,
+        /// What there is.
+        offered: String,
+    },
+    /// The device went away.
+    #[error("{adapter} was lost: {reason}; begin again, or draw on the processor")]
+    Lost {
+        /// The adapter's name.
+        adapter: String,
+        /// What it said.
+        reason: String,
+    },
+    /// The adapter gave no device.
+    #[error("{adapter} gave no device: {reason}")]
+    NoDevice {
+        /// The adapter's name.
+        adapter: String,
+        /// What it said.
+        reason: String,
+    },
+}
+
+impl Gpu {
+    /// The best adapter there is, without a window. The usual variables of wgpu choose another: `WGPU_BACKEND`, `WGPU_ADAPTER_NAME`.
+    pub fn headless() -> Result<Gpu, GpuError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        Gpu::of(&instance, None)
+    }
+
+    /// The best adapter of an instance; one that can draw to a window's surface, if that is given.
+    pub fn of(instance: &wgpu::Instance, surface: Option<&wgpu::Surface>) -> Result<Gpu, GpuError> {
+        let adapter = pollster::block_on(wgpu::util::initialize_adapter_from_env_or_default(instance, surface))
+            .map_err(|e| GpuError::NoAdapter { tried: one_line(&e) })?;
+        let info = adapter.get_info();
+        let limits = adapter.limits();
+        let wanted = wgpu::Limits::default();
+        let mut lacks = String::new();
+        wanted.check_limits_with_fail_fn(&limits, false, |name, wanted, offered| {
+            let _ = write!(lacks, "{}{name} {offered} of {wanted}", if lacks.is_empty() { "" } else { ", " });
+        });
+        if !lacks.is_empty() {
+            return Err(GpuError::TooLittle {
+                adapter: info.name,
+                wanted: "the limits that WebGPU promises".into(),
+                offered: lacks,
+            });
+        }
+        // Large rasters want large textures; nothing else goes beyond what every WebGPU device has.
+        let limits = wgpu::Limits {
+            max_texture_dimension_2d: limits.max_texture_dimension_2d,
+            max_buffer_size: limits.max_buffer_size,
+            max_storage_buffer_binding_size: limits.max_storage_buffer_binding_size,
+            ..wanted
+        };
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("littoral"),
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_limits: limits,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), reason: one_line(&e) })?;
+        Ok(Gpu { device, queue, adapter: info })
+    }
+
+    /// Whether the adapter is a processor that does a GPU's work.
+    pub fn is_software(&self) -> bool {
+        self.adapter.device_type == wgpu::DeviceType::Cpu
+    }
+}
+
+/// An error in one line.
+fn one_line(error: &dyn std::error::Error) -> String {
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
+}
