@@ -42,6 +42,8 @@ pub(crate) struct Uniforms {
     skylight: [f32; 4],
     mist: [f32; 4],
     climate: [f32; 4],
+    block: [f32; 4],
+    floor: [f32; 4],
     open: [[f32; 4]; 9],
     noise: [Noise; NOISES],
 }
@@ -102,7 +104,8 @@ impl Uniforms {
         let corner = corner + right * look.offset.x + down * look.offset.y;
 
         let steps = (flat - scenery.origin) / scenery.step;
-        let whole = steps.floor().clamp(DVec2::splat(-2.0e9), DVec2::splat(2.0e9));
+        // Differences of lattice points are whole numbers of 32 bits: the eye is counted from the land's nearest point.
+        let whole = steps.floor().clamp(DVec2::ZERO, DVec2::splat((1u64 << 30) as f64));
         let four = |v: Vec3, w: f32| [v.x, v.y, v.z, w];
         let pair = |a: DVec2, b: DVec2| [a.x as f32, a.y as f32, b.x as f32, b.y as f32];
         let place = |origin: DVec2, spacing: DVec2| pair((flat - origin) / spacing, 1.0 / spacing);
@@ -124,7 +127,7 @@ impl Uniforms {
             corner: four(corner, View::NEAR / depth),
             right: four(right, 1.0 / view.pixels_per_radian),
             down: four(down, look.number as f32),
-            eye_steps: [whole.x as i64 as i32 as u32, whole.y as i64 as i32 as u32, 0, 0],
+            eye_steps: [whole.x as u32, whole.y as u32, 0, 0],
             step: pair(scenery.step, steps - whole),
             eye: {
                 let [x, y, ..] = place(scenery.map_origin, scenery.map_spacing);
@@ -145,11 +148,15 @@ impl Uniforms {
                 (scenery.land.1 - scenery.land.0).max_element() as f32,
             ],
             basin: place(scenery.basin_origin, scenery.basin_spacing),
-            basin_size: [scenery.basin_size.x as f32, scenery.basin_size.y as f32, 0.0, 0.0],
+            basin_size: [scenery.basin_size.x as f32, scenery.basin_size.y as f32, flag(scenery.has_lakes), 0.0],
             land: pair(scenery.land.0 - flat, scenery.land.1 - flat),
             skylight: place(scenery.skylight_origin, scenery.skylight_spacing),
             mist: four(scenery.mist.0, (scenery.mist.1 - eye.z) as f32),
             climate: [scenery.lines[0], scenery.lines[1], 60_000.0, (0.06 * eye.x + 0.03 * eye.y) as f32],
+            block: scenery.block.map_or([0.0; 4], |block| pair(block.low - flat, block.high - flat)),
+            floor: scenery.block.map_or([0.0; 4], |block| {
+                [(block.floor - eye.z) as f32, block.thickness as f32, 1.0, flag(scenery.is_cut_away)]
+            }),
             open: scenery.open.map(|light| four(light, 0.0)),
             noise,
         }

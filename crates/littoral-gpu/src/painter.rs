@@ -17,6 +17,7 @@ pub struct Painter {
     renderer: Renderer,
     scenery: Scenery,
     ground: Triangles,
+    white: [f32; 3],
 }
 
 /// Why a stage cannot be painted.
@@ -39,9 +40,7 @@ pub enum PainterError {
         most: u32,
     },
     /// Something that it does not draw.
-    #[error(
-        "expected land in natural colours with an eye within it, got {got}: the GPU does not draw that yet; draw it on the processor"
-    )]
+    #[error("expected land in natural colours, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
         /// What the stage shows.
         got: &'static str,
@@ -52,10 +51,10 @@ impl Painter {
     /// A painter of a stage.
     ///
     /// # Errors
-    /// If the stage is not in natural colours, is a block, stands on an ellipsoid, or is larger than the device's textures.
+    /// If the stage is not in natural colours, stands on an ellipsoid, or is larger than the device's textures.
     pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
         let Some(tables) = stage.tables() else {
-            return Err(PainterError::Unknown { got: "a block, a map, or a picture laid over the ground" });
+            return Err(PainterError::Unknown { got: "a map, or a picture laid over the ground" });
         };
         let Datum::Plane { origin, size } = stage.land().datum() else {
             return Err(PainterError::Unknown { got: "an ellipsoid" });
@@ -63,7 +62,7 @@ impl Painter {
         let height = f64::from(stage.land().height_range().high).max(2.0);
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
-        Ok(Painter { gpu, renderer, scenery, ground: Triangles::default() })
+        Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), white: tables.white })
     }
 
     /// What paints.
@@ -95,6 +94,7 @@ impl Painter {
         let looks = looks.max(1);
         let share = 1.0 / looks as f32;
         let mut picture = Picture::empty(view.size, view.eye);
+        picture.white = self.white;
         let (corner, right, down) = view.frame();
         let width = view.size.x as usize;
         for number in 0..looks {

@@ -19,6 +19,7 @@ pub const SHADERS: [(&str, &str); 4] = [
             include_str!("shaders/air.wgsl"),
             include_str!("shaders/natural.wgsl"),
             include_str!("shaders/water.wgsl"),
+            include_str!("shaders/block.wgsl"),
             include_str!("shaders/shade.wgsl"),
         ),
     ),
@@ -212,7 +213,7 @@ impl Renderer {
                 ..Default::default()
             }),
             uniforms: uniform("frame", size_of::<Uniforms>() as u64),
-            shown: uniform("shown", 16),
+            shown: uniform("shown", 32),
             canvas: None,
         }
     }
@@ -291,6 +292,7 @@ impl Renderer {
             &scenery.basin,
             &scenery.rim,
             &scenery.depths,
+            &scenery.cut,
         ]
         .map(|texture| texture.create_view(&Default::default()));
         let mut entries = vec![
@@ -298,7 +300,7 @@ impl Renderer {
             wgpu::BindGroupEntry { binding: 6, resource: wgpu::BindingResource::Sampler(&self.sampler) },
             wgpu::BindGroupEntry { binding: 15, resource: wgpu::BindingResource::TextureView(&canvas.depth) },
         ];
-        let numbers = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14];
+        let numbers = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 18];
         entries.extend(numbers.into_iter().zip(&textures).map(|(binding, view)| wgpu::BindGroupEntry {
             binding,
             resource: wgpu::BindingResource::TextureView(view),
@@ -359,6 +361,7 @@ impl Renderer {
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
+        scenery: &Scenery,
         grey: f32,
         target: &wgpu::TextureView,
         size: UVec2,
@@ -366,7 +369,8 @@ impl Renderer {
         let Some(canvas) = &self.canvas else { return };
         let stretch = canvas.size.as_vec2() / size.max(UVec2::ONE).as_vec2();
         let encodes = if self.format.is_srgb() { 1.0 } else { 0.0 };
-        let shown = [0.30 / grey.max(1e-9), encodes, stretch.x, stretch.y];
+        let scale = scenery.balance * (0.30 / grey.max(1e-9));
+        let shown = [scale.x, scale.y, scale.z, 0.0, encodes, stretch.x, stretch.y, 0.0];
         gpu.queue.write_buffer(&self.shown, 0, bytemuck::cast_slice(&shown));
         let radiance = canvas.radiance.create_view(&Default::default());
         let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {

@@ -4,7 +4,7 @@ use crate::device::Gpu;
 use crate::frame::LEVELS;
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
-use littoral::picture::{Lattice, SkyTable, Tables};
+use littoral::picture::{Lattice, SkyTable, Slab, Tables};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{TextureDimension, TextureFormat};
 
@@ -24,6 +24,7 @@ pub struct Scenery {
     pub(crate) basin: wgpu::Texture,
     pub(crate) rim: wgpu::Texture,
     pub(crate) depths: wgpu::Texture,
+    pub(crate) cut: wgpu::Texture,
     /// Of the lattice that meshes' vertices are on (m), and metres a step.
     pub(crate) origin: DVec2,
     pub(crate) step: DVec2,
@@ -43,11 +44,16 @@ pub struct Scenery {
     pub(crate) basin_origin: DVec2,
     pub(crate) basin_spacing: DVec2,
     pub(crate) basin_size: UVec2,
+    pub(crate) has_lakes: bool,
     pub(crate) land: (DVec2, DVec2),
     pub(crate) skylight_origin: DVec2,
     pub(crate) skylight_spacing: DVec2,
     pub(crate) mist: (Vec3, f64),
     pub(crate) lines: [f32; 2],
+    pub(crate) block: Option<Slab>,
+    pub(crate) is_cut_away: bool,
+    /// What light is multiplied by so that white is shown white.
+    pub(crate) balance: Vec3,
     pub(crate) open: [Vec3; 9],
     /// Height of the eye (m) that the sky is that of.
     sky_height: f64,
@@ -100,7 +106,14 @@ impl Scenery {
             false => make("known", TextureFormat::R8Unorm, map, &tables.known),
         };
         let nowhere = Lattice { columns: 1, rows: 1, origin: DVec2::ZERO, spacing: DVec2::ONE, values: vec![0] };
-        let basin = tables.water.as_ref().map_or(&nowhere, |water| &water.1);
+        let has_lakes = !tables.lakes.values.is_empty();
+        let lakes = if has_lakes { &tables.lakes } else { &nowhere };
+        let basin = tables.water.as_ref().map_or(lakes, |water| &water.1);
+        let wet: Vec<u8> = (0..basin.values.len())
+            .flat_map(|i| {
+                [if tables.water.is_some() { basin.values[i] } else { 0 }, if has_lakes { lakes.values[i] } else { 0 }]
+            })
+            .collect();
         let basin_size = UVec2::new(basin.columns as u32, basin.rows as u32);
         let rim: Vec<f32> = match tables.rim.values.is_empty() {
             true => vec![0.0, 0.0, 0.0, 0.0],
@@ -154,9 +167,16 @@ impl Scenery {
                 [tables.sunlight.len() as u32, 1, 1],
                 bytemuck::cast_slice(&halves(tables.sunlight.iter().map(|&s| (s, 0.0)))),
             ),
-            basin: make("basin", TextureFormat::R8Unorm, [basin_size.x, basin_size.y, 1], &basin.values),
+            basin: make("basin", TextureFormat::Rg8Unorm, [basin_size.x, basin_size.y, 1], &wet),
             rim: make("rim", TextureFormat::Rg32Float, rim_size, bytemuck::cast_slice(&rim)),
             depths: make("depths", half, [tables.depths.len() as u32, 2, 1], bytemuck::cast_slice(&halves(depths))),
+            cut: match tables.cut_away.is_empty() {
+                true => make("cut", TextureFormat::R8Unorm, [1, 1, 1], &[0]),
+                false => {
+                    let cut: Vec<u8> = tables.cut_away.iter().map(|&cut| 255 * u8::from(cut)).collect();
+                    make("cut", TextureFormat::R8Unorm, map, &cut)
+                }
+            },
             origin: datum.0,
             step: datum.1 / (1u64 << 30) as f64,
             map_origin: finest.origin,
@@ -175,11 +195,18 @@ impl Scenery {
             basin_origin: basin.origin,
             basin_spacing: basin.spacing,
             basin_size,
+            has_lakes,
             land: tables.land,
             skylight_origin: tables.skylight.origin,
             skylight_spacing: tables.skylight.spacing,
             mist: tables.mist,
             lines: tables.lines,
+            block: tables.block,
+            is_cut_away: !tables.cut_away.is_empty(),
+            balance: {
+                let white = Vec3::from(tables.white).max(Vec3::splat(1e-9));
+                white.dot(Vec3::new(0.2126, 0.7152, 0.0722)) / white
+            },
             open: tables.open,
             sky_height: f64::NAN,
         };

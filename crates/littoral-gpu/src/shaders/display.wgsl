@@ -2,7 +2,12 @@
 
 @group(0) @binding(0) var radiance_map: texture_2d<f32>;
 // What radiance is multiplied by; whether the target encodes sRGB by itself; pixels of the picture for each of the target.
-@group(0) @binding(1) var<uniform> shown: vec4f;
+struct Shown {
+    scale: vec4f,
+    how: vec4f,
+}
+
+@group(0) @binding(1) var<uniform> shown: Shown;
 
 @vertex
 fn everywhere(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
@@ -35,23 +40,23 @@ fn film(light: vec3f) -> vec3f {
 // A pixel as it is shown.
 fn shown_at(at: vec2i) -> vec3f {
     let last = vec2i(textureDimensions(radiance_map)) - 1;
-    return film(textureLoad(radiance_map, clamp(at, vec2i(0), last), 0).rgb * shown.x);
+    return film(textureLoad(radiance_map, clamp(at, vec2i(0), last), 0).rgb * shown.scale.rgb);
 }
 
 @fragment
 fn display(@builtin(position) position: vec4f) -> @location(0) vec4f {
     var encoded: vec3f;
-    if all(shown.zw == vec2f(1.0)) {
+    if all(shown.how.yz == vec2f(1.0)) {
         encoded = shown_at(vec2i(position.xy));
     } else {
         // Between the four nearest pixels.
-        let p = position.xy * shown.zw - 0.5;
+        let p = position.xy * shown.how.yz - 0.5;
         let i = vec2i(floor(p));
         let f = p - floor(p);
         let top = mix(shown_at(i), shown_at(i + vec2i(1, 0)), f.x);
         encoded = mix(top, mix(shown_at(i + vec2i(0, 1)), shown_at(i + 1), f.x), f.y);
     }
-    if shown.y == 0.0 {
+    if shown.how.x == 0.0 {
         return vec4f(encoded, 1.0);
     }
     let linear = select(pow((encoded + 0.055) / 1.055, vec3f(2.4)), encoded / 12.92, encoded <= vec3f(0.04045));

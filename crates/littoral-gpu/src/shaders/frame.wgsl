@@ -15,9 +15,9 @@ struct Frame {
     corner: vec4f,
     right: vec4f,
     down: vec4f,
-    // Lattice point of the eye.
+    // Lattice point of the eye, or the land's nearest to it.
     eye_steps: vec4u,
-    // Metres a step; what is left of the eye in steps.
+    // Metres a step; how far the eye is beyond that point, in steps.
     step: vec4f,
     // The eye among the samples (columns, rows); its height (m); mean distance of samples (m).
     eye: vec4f,
@@ -35,6 +35,7 @@ struct Frame {
     water: vec4f,
     // The eye among the samples of the water's basin; samples a metre.
     basin: vec4f,
+    // Its columns and rows; whether there are lakes.
     basin_size: vec4f,
     // The land's rectangle from the eye (m).
     land: vec4f,
@@ -44,6 +45,10 @@ struct Frame {
     mist: vec4f,
     // Tree line and snow line (m); greatest height of the eye in the sky's table (m).
     climate: vec4f,
+    // The block's rectangle from the eye (m).
+    block: vec4f,
+    // Its floor over the eye (m), its thickness (m), whether there is one, whether any of it is cut away.
+    floor: vec4f,
     // Harmonics of the light over an open plain.
     open: array<vec4f, 9>,
     noise: array<Noise, 56>,

@@ -1,6 +1,6 @@
 // Light on and in still water: the engine's `picture::sea`, and what of `picture::shade` belongs to it.
 
-// Not 0 where ground below the water's level is wet.
+// Red: not 0 where ground below the water's level is wet; green: distance to the shore of a lake in samples, over 255, 0 where there is none.
 @group(0) @binding(12) var basin_map: texture_2d<f32>;
 // Beyond the land: depth (m) and share of water, by place along the border and distance from it.
 @group(0) @binding(13) var rim_map: texture_2d<f32>;
@@ -16,6 +16,36 @@ fn covers(rel: vec2f) -> bool {
         return frame.water.z > 0.0;
     }
     return textureLoad(basin_map, vec2i(round(place)), 0).x > 0.0;
+}
+
+// Distance (m) to the shore of the lake at a place, negative where there is none. Its edge is the contour of the ground a few centimetres above its level.
+fn lake_at(rel: vec2f) -> f32 {
+    let p = frame.basin.xy + rel * frame.basin.zw;
+    if frame.basin_size.z == 0.0 || any(p < vec2f(0.0)) || any(p > frame.basin_size.xy - 1.0) {
+        return -1.0;
+    }
+    let ij = min(vec2i(p), vec2i(frame.basin_size.xy) - 2);
+    let f = p - vec2f(ij);
+    let a = textureLoad(basin_map, ij, 0).y;
+    let b = textureLoad(basin_map, ij + vec2i(1, 0), 0).y;
+    let c = textureLoad(basin_map, ij + vec2i(0, 1), 0).y;
+    let d = textureLoad(basin_map, ij + 1, 0).y;
+    if a + b + c + d == 0.0 {
+        return -1.0;
+    }
+    var wet = vec2f(1.0, 1.0);
+    if a > 0.0 {
+        wet = vec2f(0.0);
+    } else if b > 0.0 {
+        wet = vec2f(1.0, 0.0);
+    } else if c > 0.0 {
+        wet = vec2f(0.0, 1.0);
+    }
+    let level = mean_of(sample_of(rel + (wet - f) / frame.basin.zw), 0u);
+    if mean_of(sample_of(rel), 0u) > level + 0.05 {
+        return -1.0;
+    }
+    return mix(mix(a, b, f.x), mix(c, d, f.x), f.y) * 255.0 / max(frame.basin.z, frame.basin.w);
 }
 
 // Depth (m) and share of water beyond the border, by how far away that is.

@@ -213,6 +213,11 @@ impl<'a> Ground<'a> {
         self.means.len()
     }
 
+    /// Which samples were cut away from a block; empty for none.
+    pub fn cut_away_samples(&self) -> &[bool] {
+        &self.cut_away
+    }
+
     /// How far each sample is known, 255 for wholly; empty when all is.
     pub fn known_samples(&self) -> &[u8] {
         &self.known

@@ -41,7 +41,7 @@ pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
 pub use display::{Display, Exposure, Medium, Picture};
 pub use drawn::{Meshes, mesh_errors};
 pub use stage::Stage;
-pub use tables::{Lattice, SkyTable, Tables};
+pub use tables::{Lattice, SkyTable, Slab, Tables};
 pub use texture::{Drape, Texture};
 
 use crate::field::{Lakes, Land, Sea, Water};

@@ -1,9 +1,10 @@
 //! A stage in numbers: what renderers elsewhere need to light the same scene alike.
 
+use super::Style;
 use super::atmosphere::{AZIMUTHS, DISTANCES, ELEVATIONS, Sky};
+use super::block::MIST;
 use super::horizon::horizon;
 use super::stage::{HIGHEST_EYE, Stage};
-use super::{Border, Style};
 use glam::{DVec2, Vec2, Vec3};
 
 /// Values at the points of a lattice, row by row from the south-western one.
@@ -21,6 +22,19 @@ pub struct Lattice<T> {
     pub values: Vec<T>,
 }
 
+/// The block that land is cut to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slab {
+    /// South-western corner (m).
+    pub low: DVec2,
+    /// North-eastern corner (m).
+    pub high: DVec2,
+    /// Height of the floor it stands on (m).
+    pub floor: f64,
+    /// From there to the lowest ground (m).
+    pub thickness: f64,
+}
+
 /// What of a scene does not depend on the eye. Light is linear Rec. 709.
 #[derive(Clone, Debug)]
 pub struct Tables {
@@ -34,6 +48,8 @@ pub struct Tables {
     pub horizon: Vec<f32>,
     /// Where ground below the level of the water (m) is wet: at points whose value is not 0.
     pub water: Option<(f64, Lattice<u8>)>,
+    /// At the same points as the water, distance to the shore of the lake there, in samples: 0 where there is none; empty where there are no lakes.
+    pub lakes: Lattice<u8>,
     /// Whether that water goes on to the horizon.
     pub endless: bool,
     /// Beyond the land, depth (m) and share of water: for places along the border, counter-clockwise from its south-western corner (columns, evenly), and
@@ -61,6 +77,12 @@ pub struct Tables {
     pub mist: (Vec3, f64),
     /// Whether distance veils things.
     pub veils_distance: bool,
+    /// What is shown as white (kcd/m²): see [`Picture::white`](super::Picture::white).
+    pub white: [f32; 3],
+    /// The block that the land is cut to, if it is.
+    pub block: Option<Slab>,
+    /// Which points of the finest level were cut away from it; empty for none.
+    pub cut_away: Vec<bool>,
     /// Heights (m) of tree and snow line.
     pub lines: [f32; 2],
     /// The sky's light as the land sees it.
@@ -95,10 +117,10 @@ impl Tables {
 const RIM: [usize; 2] = [1024, 40];
 
 impl Stage<'_> {
-    /// The stage in numbers; `None` for what only pictures by rays can show so far: blocks, maps and images laid over the ground.
+    /// The stage in numbers; `None` for what only pictures by rays can show so far: maps and images laid over the ground.
     pub fn tables(&self) -> Option<Tables> {
         let scene = &self.scene;
-        if scene.border == Border::Cut || scene.style != Style::Natural {
+        if scene.style != Style::Natural {
             return None;
         }
         let raster = self.ground.land.raster();
@@ -127,21 +149,17 @@ impl Stage<'_> {
                 values: values.collect(),
             }
         });
+        let on_land = |values: &[u8]| {
+            let raster = scene.land.raster();
+            let (columns, rows, spacing) = (raster.columns(), raster.rows(), raster.spacing());
+            Lattice { columns, rows, origin: land.0, spacing, values: values.to_vec() }
+        };
         Some(Tables {
             horizon,
             known: self.ground.known_samples().to_vec(),
             standing: self.ground.standing_samples().to_vec(),
-            water: scene.water.map(|water| {
-                let raster = scene.land.raster();
-                let lattice = Lattice {
-                    columns: raster.columns(),
-                    rows: raster.rows(),
-                    origin: land.0,
-                    spacing: raster.spacing(),
-                    values: water.basin().to_vec(),
-                };
-                (water.level, lattice)
-            }),
+            water: scene.water.map(|water| (water.level, on_land(water.basin()))),
+            lakes: scene.lakes.map_or(Lattice::default(), |lakes| on_land(lakes.shores())),
             endless: scene.water.is_some_and(|water| water.reaches_horizon()),
             rim,
             land,
@@ -154,6 +172,9 @@ impl Stage<'_> {
             sun_radius: scene.sun.angular_radius as f32,
             disc: self.sky.disc_radiance(),
             mist: (self.mist, self.ground.mist),
+            white: if self.ground.block.is_some() { (self.mist / MIST).to_array() } else { [1.0; 3] },
+            block: self.ground.block.map(|block| block.slab()),
+            cut_away: self.ground.cut_away_samples().to_vec(),
             veils_distance: scene.air.veils_distance,
             lines: [scene.climate.tree_line, scene.climate.snow_line],
             land_sky: self.sky_table(f64::from(self.middle)).light,
