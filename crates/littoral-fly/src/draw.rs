@@ -92,9 +92,8 @@ impl Renderer {
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let locked = full.lock().unwrap_or_else(PoisonError::into_inner);
         self.full.draw(gpu, &mut encoder, &locked, &self.ground, &view, Look::default());
-        drop(locked);
         match surface {
-            true => self.full.show(gpu, &mut encoder, grey, target, size),
+            true => self.full.show(gpu, &mut encoder, &locked, grey, target, size),
             false => clear(&mut encoder, target, [0.82, 0.84, 0.86]),
         }
         if wireframe {

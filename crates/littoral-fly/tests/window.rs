@@ -190,6 +190,7 @@ fn a_flight_by_keys_and_clicks() {
     pause();
     assert!(differ(&along.2, &take().2) > 0.2, "the flight along the path moves");
     key("p");
+    key("Home");
     key("4");
     assert!(shows_something(&take()), "a blank picture from the boat");
 
