@@ -456,6 +456,20 @@ mod tests {
     }
 
     #[test]
+    fn paths_are_saved_in_round_numbers_of_the_file() {
+        let at = |x, y, level| Spot { xy: DVec2::new(x, y), level };
+        let spot = at(1.234_567, -2.0, Level::AboveGround(30.126));
+        let look = Look::At(at(9.876_543, 0.0, Level::Absolute(5.0)));
+        let path = FlightPath { points: vec![Waypoint { spot, look }], ..FlightPath::default() };
+        let saved = SavedPath::of(&path.stretched(2.0), |xy| xy + 100.0, 3);
+        let expected = Waypoint {
+            spot: at(101.235, 98.0, Level::AboveGround(60.25)),
+            look: Look::At(at(109.877, 100.0, Level::Absolute(10.0))),
+        };
+        assert_eq!((saved.coordinates, &saved.path.points[..]), (Coordinates::File, &[expected][..]));
+    }
+
+    #[test]
     fn points_are_placed_or_named() {
         let saved = example();
         let twice = saved.placed(|_, xy| Some(xy * 2.0)).expect("placed");

@@ -78,8 +78,8 @@ mod tests {
         for i in 0..100 {
             let time = 0.237 * f64::from(i);
             let (played, exact) = (tape.pose(time), flight.pose(time));
-            assert!(played.position.distance(exact.position) < 1e-3 * tape.length, "at {time} s");
-            assert!(played.direction.distance(exact.direction) < 1e-2, "at {time} s");
+            assert!(played.position.distance(exact.position) < 2e-6 * tape.length, "at {time} s");
+            assert!(played.direction.distance(exact.direction) < 1e-5, "at {time} s");
         }
         assert!(Tape::of(&FlightPath::default(), &subject, 60.0).is_err_and(|e| e.contains("points")));
         // What takes weeks is not recorded.
