@@ -7,5 +7,7 @@
 //! So a picture costs the same light whatever the method, and two methods differ by their triangles alone.
 
 mod device;
+pub mod sea;
 
 pub use device::{Gpu, GpuError};
+pub use sea::GpuSea;

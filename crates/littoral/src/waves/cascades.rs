@@ -27,11 +27,13 @@ mod foam;
 mod patch;
 mod plan;
 mod query;
+mod spectrum;
 #[cfg(test)]
 mod tests;
 mod velocity;
 
 pub use plan::Tile;
+pub use spectrum::{Spectrum, Wave};
 
 use super::fft::steps::Run;
 use super::model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};

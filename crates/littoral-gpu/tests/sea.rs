@@ -1,0 +1,226 @@
+//! The sea on the GPU against the sea on the processor, and against closed forms. Where there is no adapter these tests say so and pass; that the
+//! shaders are sound is tested without one.
+
+use littoral::waves::cascades::{Cascades, Options, Tile};
+use littoral::waves::{BLOCK, Motion, Points, SeaState, WaveModel};
+use littoral_gpu::{Gpu, GpuSea};
+use std::f64::consts::TAU;
+
+/// How far samples may be from the processor's, over the root mean square of their field.
+const TOLERANCE: f64 = 1e-5;
+
+/// The order of the fields of a sample.
+const FIELDS: [&str; 8] = ["z", "x", "xx", "y", "yy", "zx", "xy", "zy"];
+
+fn gpu() -> Option<Gpu> {
+    match Gpu::headless() {
+        Ok(gpu) => Some(gpu),
+        Err(error) => {
+            println!("not tested: {error}");
+            None
+        }
+    }
+}
+
+/// Samples of a tile at a level, eight fields each, row by row.
+fn samples(gpu: &Gpu, texture: &wgpu::Texture, tile: u32, level: u32) -> Vec<[f32; 8]> {
+    let side = texture.width() >> level;
+    let bytes = u64::from(side) * u64::from(side) * 16;
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: 2 * bytes,
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_texture_to_buffer(
+        wgpu::TexelCopyTextureInfo {
+            texture,
+            mip_level: level,
+            origin: wgpu::Origin3d { x: 0, y: 0, z: 2 * tile },
+            aspect: wgpu::TextureAspect::All,
+        },
+        wgpu::TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(16 * side),
+                rows_per_image: Some(side),
+            },
+        },
+        wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 2 },
+    );
+    gpu.queue.submit([encoder.finish()]);
+    buffer.slice(..).map_async(wgpu::MapMode::Read, |result| result.expect("a mapped buffer"));
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).expect("a working device");
+    let view = buffer.slice(..).get_mapped_range().expect("a mapped range");
+    let numbers: &[[f32; 4]] = bytemuck::cast_slice(&view);
+    let (first, second) = numbers.split_at(numbers.len() / 2);
+    first.iter().zip(second).map(|(a, b)| [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]).collect()
+}
+
+/// The processor's samples of a sea of one unturned tile, on `side` samples, of the waves at least twice `footprint` (m) long.
+fn expected(sea: &Cascades, tile: &Tile, side: u32, footprint: f32) -> Vec<[f32; 8]> {
+    let mut all = Vec::new();
+    let apart = tile.length / f64::from(side);
+    for j in 0..side {
+        for block in 0..side / BLOCK as u32 {
+            let mut points = Points::at(0.0, f64::from(j) * apart);
+            points.footprint = [footprint; BLOCK];
+            for l in 0..BLOCK {
+                points.x[l] = (f64::from(block) * BLOCK as f64 + l as f64) * apart;
+            }
+            let mut m = Motion::STILL;
+            sea.add_motion(&points, &mut m);
+            all.extend(
+                (0..BLOCK)
+                    .map(|l| [m.dz[l], m.dx[l], m.dxx[l], m.dy[l], m.dyy[l], m.slope_x[l], m.dxy[l], m.slope_y[l]]),
+            );
+        }
+    }
+    all
+}
+
+/// The greatest difference over the root mean square, by field.
+fn difference(got: &[[f32; 8]], expected: &[[f32; 8]]) -> [f64; 8] {
+    assert_eq!(got.len(), expected.len());
+    std::array::from_fn(|f| {
+        let square: f64 = expected.iter().map(|e| f64::from(e[f]).powi(2)).sum();
+        let rms = (square / expected.len() as f64).sqrt();
+        let most = got.iter().zip(expected).map(|(g, e)| (f64::from(g[f]) - f64::from(e[f])).abs()).fold(0.0, f64::max);
+        // No comparison with NaN is true.
+        assert!(got.iter().all(|g| g[f].is_finite()), "{}", FIELDS[f]);
+        most / rms.max(1e-12)
+    })
+}
+
+#[test]
+fn samples_are_those_of_the_processor() {
+    let Some(gpu) = gpu() else { return };
+    let mut worst: f64 = 0.0;
+    for (samples_a_side, seed, beaufort) in [(64, 1, 3.0), (128, 7, 8.0), (256, 2, 5.0), (512, 3, 6.0)] {
+        let state = SeaState { seed, ..SeaState::beaufort(beaufort, 0.6).expect("a state") };
+        let length = 350.0;
+        let highest = 0.5 * (samples_a_side as f64 - 1.0) * 0.5 * TAU / length;
+        let tile = Tile { length, turn: 0.0, samples: samples_a_side, lowest: 0.03, highest };
+        let options = Options { foam: false, ..Options::default() };
+        let mut sea = Cascades::with_tiles(&state, &[tile], &options).expect("a sea");
+        let mut on_gpu = GpuSea::new(&gpu, &sea).expect("a sea");
+        for time in [0.0, 12.5, 86_400.0, 1e8, -1234.567] {
+            sea.set_time(time);
+            on_gpu.set_time(time);
+            for level in 0..on_gpu.motion().mip_level_count() {
+                let side = on_gpu.motion().width() >> level;
+                // The footprint that a level is for.
+                let footprint = (std::f64::consts::PI / highest) as f32 * (1 << level) as f32;
+                let expected = expected(&sea, &tile, side, if level == 0 { 0.0 } else { footprint });
+                let got = samples(&gpu, on_gpu.motion(), 0, level);
+                for (f, off) in difference(&got, &expected).into_iter().enumerate() {
+                    assert!(off < TOLERANCE, "{samples_a_side} at {time}, level {level}, {}: {off}", FIELDS[f]);
+                    worst = worst.max(off);
+                }
+            }
+        }
+    }
+    println!("at most {worst:.1e} of the root mean square");
+}
+
+#[test]
+fn a_few_waves_are_their_closed_form() {
+    let Some(gpu) = gpu() else { return };
+    let state = SeaState::of_wind(9.0, 0.3, 2e5).expect("a wind");
+    let (length, options) = (90.0, Options { foam: false, ..Options::default() });
+    let step = TAU / length;
+    for depth in [3.0, f64::INFINITY] {
+        let state = SeaState { depth, ..state.clone() };
+        // Only (±4, 0) and (0, ±4).
+        let tile = Tile { length, turn: 0.0, samples: 64, lowest: 3.9 * step, highest: 4.05 * step };
+        let sea = Cascades::with_tiles(&state, &[tile], &options).expect("a sea");
+        let mut on_gpu = GpuSea::new(&gpu, &sea).expect("a sea");
+        let spectrum = sea.spectra().next().expect("a tile");
+        for time in [0.0, 3.7, 86_400.25, 315_576_000.5] {
+            on_gpu.set_time(time);
+            let got = samples(&gpu, on_gpu.motion(), 0, 0);
+            let mut expected = vec![[0.0; 8]; got.len()];
+            for (m, n) in [(4, 0), (-4, 0), (0, 4), (0, -4)] {
+                let wave = spectrum.wave(m, n);
+                assert!(wave.turns > 0.0 && wave.levels == 1, "{wave:?}");
+                let (k, angle) = (4.0 * step, TAU * (wave.turns * time).fract());
+                let coth = if depth.is_finite() { 1.0 / (k * depth).tanh() } else { 1.0 };
+                let (kx, ky) = (f64::from(m) * step, f64::from(n) * step);
+                let (ux, uy) = (kx / k * coth, ky / k * coth);
+                let [s, d] = [wave.sum, wave.difference].map(|c| c.map(f64::from));
+                let (sine, cosine) = angle.sin_cos();
+                let h = [s[0] * cosine + d[1] * sine, s[1] * cosine - d[0] * sine];
+                for (at, e) in expected.iter_mut().enumerate() {
+                    let apart = length / 64.0;
+                    let (sine, cosine) = (kx * (at % 64) as f64 * apart + ky * (at / 64) as f64 * apart).sin_cos();
+                    // h e^(ik·x), and i times that: the real parts.
+                    let (real, quarter) = (h[0] * cosine - h[1] * sine, -h[0] * sine - h[1] * cosine);
+                    let own = [
+                        real,
+                        ux * quarter,
+                        -ux * kx * real,
+                        uy * quarter,
+                        -uy * ky * real,
+                        kx * quarter,
+                        -ux * ky * real,
+                        ky * quarter,
+                    ];
+                    (0..8).for_each(|f| e[f] += own[f]);
+                }
+            }
+            let expected: Vec<[f32; 8]> = expected.iter().map(|e| e.map(|e| e as f32)).collect();
+            for (f, off) in difference(&got, &expected).into_iter().enumerate() {
+                // ∂x/∂y vanishes for waves along the axes.
+                assert!(off < TOLERANCE || FIELDS[f] == "xy", "{depth} at {time}, {}: {off}", FIELDS[f]);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_instant_has_the_same_bits_whatever_was_before() {
+    let Some(gpu) = gpu() else { return };
+    let state = SeaState::beaufort(6.0, 0.6).expect("a state");
+    let sea = Cascades::new(&state, &Options { samples: 64, foam: false, ..Options::default() }).expect("a sea");
+    let mut one = GpuSea::new(&gpu, &sea).expect("a sea");
+    let mut other = GpuSea::new(&gpu, &sea).expect("a sea");
+    one.set_time(77.7);
+    other.set_time(1e6);
+    other.set_time(3.0);
+    other.set_time(77.7);
+    for tile in 0..sea.tiles().len() as u32 {
+        for level in 0..one.motion().mip_level_count() {
+            let [a, b] = [&one, &other].map(|sea| samples(&gpu, sea.motion(), tile, level));
+            assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| a.to_bits() == b.to_bits()));
+            if level == 0 {
+                assert!(a.iter().any(|sample| sample[0].abs() > 1e-4), "still water");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_loop_returns_to_the_same_bits() {
+    let Some(gpu) = gpu() else { return };
+    let state = SeaState::beaufort(6.0, 0.6).expect("a state");
+    let options = Options { samples: 64, foam: false, period: Some(20.0), ..Options::default() };
+    let sea = Cascades::new(&state, &options).expect("a sea");
+    let mut on_gpu = GpuSea::new(&gpu, &sea).expect("a sea");
+    let mut at = |time| {
+        on_gpu.set_time(time);
+        samples(&gpu, on_gpu.motion(), 0, 0)
+    };
+    let first = at(2.5);
+    assert!(first == at(22.5) && first == at(-17.5) && first != at(12.5));
+}
+
+#[test]
+fn shaders_are_sound() {
+    let source = include_str!("../src/shaders/sea_transform.wgsl");
+    let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+    let mut validator =
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+    validator.validate(&module).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+}
