@@ -22,7 +22,8 @@ pub struct Tile {
     first: u32,
     rows: i32,
     step: f32,
-    unused: f32,
+    /// The tile that has this one's number among those with foam.
+    with_foam: u32,
 }
 
 /// A wave as the shader knows it.
@@ -59,6 +60,8 @@ pub struct Kind {
     pub radix: u32,
     pub first: bool,
     pub last: bool,
+    /// Of a tick of foam.
+    pub foam: bool,
 }
 
 /// A pass of all tiles at a level.
@@ -67,6 +70,8 @@ pub struct Step {
     pub pass: Pass,
     /// Index of its kind.
     pub pipeline: usize,
+    /// And of that of the same pass in a tick of foam, for the finest level.
+    pub foaming: Option<usize>,
     /// Which of the two buffers it reads.
     pub from: usize,
     pub workgroups: u32,
@@ -90,13 +95,13 @@ impl Plan {
     /// Invocations in a workgroup.
     const GROUP: u32 = 64;
 
-    pub fn new(sea: &Cascades) -> Plan {
+    pub fn new(sea: &Cascades, with_foam: &[usize]) -> Plan {
         let samples = sea.tiles().map(|tile| tile.samples).max().unwrap_or(64) as u32;
         let levels = sea.spectra().map(|spectrum| spectrum.levels()).max().unwrap_or(1);
         let (mut tiles, mut waves, mut rows) = (Vec::new(), Vec::new(), vec![0; levels]);
         for spectrum in sea.spectra() {
             let all = spectrum.rows();
-            tiles.push(Tile { first: waves.len() as u32, rows: all, step: spectrum.step() as f32, unused: 0.0 });
+            tiles.push(Tile { first: waves.len() as u32, rows: all, step: spectrum.step() as f32, with_foam: 0 });
             for n in -all..=all {
                 for m in -all..=all {
                     let wave = spectrum.wave(m, n);
@@ -109,6 +114,9 @@ impl Plan {
                 }
             }
         }
+        for (to, tile) in tiles.iter_mut().zip(with_foam) {
+            to.with_foam = *tile as u32;
+        }
         let mut plan = Plan { samples, levels: levels as u32, tiles, waves, kinds: Vec::new(), steps: Vec::new() };
         for (level, rows) in rows.into_iter().enumerate() {
             let samples = plan.samples >> level;
@@ -117,13 +125,16 @@ impl Plan {
                 let radices = radices(samples);
                 let mut span = 1;
                 for (index, &radix) in radices.iter().enumerate() {
-                    let kind = Kind { along_y, radix, first: index == 0, last: index + 1 == radices.len() };
+                    let kind =
+                        Kind { along_y, radix, first: index == 0, last: index + 1 == radices.len(), foam: false };
                     let stride = plan.samples / (span * radix);
                     let pass = Pass { samples, span, stride, rows, level: level as u32, unused: [0; 3] };
                     let lines = if along_y { samples } else { 2 * rows + 1 };
                     let workgroups = (lines * (samples / radix)).div_ceil(Plan::GROUP);
                     let pipeline = plan.pipeline(kind);
-                    plan.steps.push(Step { pass, pipeline, from, workgroups });
+                    let foaming =
+                        (level == 0 && !with_foam.is_empty()).then(|| plan.pipeline(Kind { foam: true, ..kind }));
+                    plan.steps.push(Step { pass, pipeline, foaming, from, workgroups });
                     from = 1 - from;
                     span *= radix;
                 }

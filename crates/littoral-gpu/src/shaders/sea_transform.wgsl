@@ -12,6 +12,8 @@ override FROM_WAVES: bool = false;
 override FROM_ROWS: bool = false;
 // Whether the pass is the last along y, which writes samples.
 override TO_SAMPLES: bool = false;
+// Whether the pass is part of a tick of foam: of the tiles that have any, the stretches alone.
+override FOAM: bool = false;
 
 // What a pass needs to know.
 struct Pass {
@@ -27,10 +29,18 @@ struct Pass {
     level: u32,
 }
 
-// An instant: whole seconds, and the rest in units of 2⁻³² s.
+// An instant.
 struct Moment {
+    // Whole seconds, and the rest in units of 2⁻³² s.
     seconds: i32,
     rest: u32,
+    // Of a tick of foam: which half of the foam is that before,
+    half: u32,
+    // what is left of it,
+    decay: f32,
+    // the least there is, and for each tile with foam the Jacobian from which there is new foam, and how much of it below that.
+    least: f32,
+    foaming: array<vec4f, 16>,
 }
 
 struct Tile {
@@ -40,7 +50,8 @@ struct Tile {
     rows: i32,
     // Between neighbouring wave numbers (rad/m).
     step: f32,
-    unused: f32,
+    // The tile that has this tile's number among those with foam.
+    with_foam: u32,
 }
 
 // Two waves against each other: see littoral::waves::cascades::Wave.
@@ -65,6 +76,8 @@ struct Wave {
 @group(0) @binding(6) var<storage, read_write> after: array<vec4f>;
 // Two layers for each tile: (z, x, ∂x/∂x, y) and (∂y/∂y, ∂z/∂x, ∂x/∂y, ∂z/∂y).
 @group(0) @binding(7) var samples: texture_storage_2d_array<rgba32float, write>;
+// Two halves, and in each the tiles with foam, row by row.
+@group(0) @binding(8) var<storage, read_write> foam: array<f32>;
 
 // The upper half of a product.
 fn upper(a: u32, b: u32) -> u32 {
@@ -116,6 +129,9 @@ fn packed(tile: Tile, half: u32, i: u32, n: i32) -> vec4f {
     let h = height(wave);
     let x = f32(m) * tile.step;
     let y = f32(n) * tile.step;
+    if FOAM {
+        return vec4f(x * x * h - y * y * vec2f(h.y, -h.x), x * y * h) * -wave.reach;
+    }
     var multipliers = vec2f(1.0 - x * wave.reach, -wave.reach * (x * x + y));
     if half == 1u {
         multipliers = vec2f(-(y * y * wave.reach + x), -(x * y * wave.reach + y));
@@ -151,8 +167,8 @@ struct Place {
     // Where the line's first number stands, and how far its numbers are apart.
     start: u32,
     apart: u32,
-    tile: u32,
-    half: u32,
+    // Two for each tile; with foam, one for each tile that has any.
+    layer: u32,
     // Index of the wave number along y.
     n: i32,
     // Of the numbers that a result of `span` has.
@@ -163,7 +179,8 @@ struct Place {
 
 fn number(place: Place, i: u32) -> vec4f {
     if FROM_WAVES {
-        return packed(tiles[place.tile], place.half, i, place.n);
+        let tile = select(place.layer / 2u, tiles[place.layer].with_foam, FOAM);
+        return packed(tiles[tile], place.layer % 2u, i, place.n);
     }
     if FROM_ROWS && min(i, pass_.samples - i) > pass_.rows {
         return vec4f(0.0);
@@ -177,8 +194,17 @@ fn number(place: Place, i: u32) -> vec4f {
 }
 
 fn keep(place: Place, i: u32, value: vec4f) {
-    if TO_SAMPLES {
-        textureStore(samples, vec2u(place.x, i), 2u * place.tile + place.half, value);
+    if TO_SAMPLES && FOAM {
+        let jacobian = (1.0 + value.x) * (1.0 + value.y) - value.z * value.z;
+        let foaming = moment.foaming[place.layer];
+        let fresh = clamp((foaming.x - jacobian) * foaming.y, 0.0, 1.0);
+        let size = pass_.samples * pass_.samples;
+        let at = place.layer * size + i * pass_.samples + place.x;
+        let half = arrayLength(&foam) / 2u;
+        let all = max(foam[moment.half * half + at] * moment.decay, fresh);
+        foam[(1u - moment.half) * half + at] = select(all, 0.0, all < moment.least);
+    } else if TO_SAMPLES {
+        textureStore(samples, vec2u(place.x, i), place.layer, value);
     } else {
         after[place.start + i * place.apart] = value;
     }
@@ -239,7 +265,7 @@ fn along_x(@builtin(global_invocation_id) id: vec3u) {
     let n = i32(line) - i32(pass_.rows);
     let row = (line + pass_.samples - pass_.rows) % pass_.samples;
     let start = (id.y * pass_.samples + row) * pass_.samples;
-    join(Place(start, 1u, id.y / 2u, id.y % 2u, n, j % pass_.span, 0u), j);
+    join(Place(start, 1u, id.y, n, j % pass_.span, 0u), j);
 }
 
 @compute @workgroup_size(64)
@@ -250,5 +276,5 @@ fn along_y(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let start = id.y * pass_.samples * pass_.samples + x;
-    join(Place(start, pass_.samples, id.y / 2u, id.y % 2u, 0, j % pass_.span, x), j);
+    join(Place(start, pass_.samples, id.y, 0, j % pass_.span, x), j);
 }

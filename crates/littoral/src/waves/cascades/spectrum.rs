@@ -1,5 +1,7 @@
 //! The waves of a tile, told one by one: for those who sum them elsewhere, say on a GPU.
 
+use super::clock::Clock;
+use super::foam::{self, Breaking};
 use super::patch::Patch;
 use super::{Cascades, Tile};
 
@@ -9,7 +11,7 @@ use super::{Cascades, Tile};
 /// real because S(−k) = S*(k) and D(−k) = −D*(k).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wave {
-    /// Turns of the phase in in a second, or in a whole loop ([`Cascades::period`]), at least 0.
+    /// Turns of the phase in in a unit of [`Breakers::time`], at least 0.
     pub turns: f64,
     /// S = h₀(k) + h₀*(−k) (m): real and imaginary part.
     pub sum: [f32; 2],
@@ -25,6 +27,74 @@ pub struct Wave {
 #[derive(Clone, Copy)]
 pub struct Spectrum<'a> {
     patch: &'a Patch,
+}
+
+/// How the foam of a tile comes and goes at a tick: what was there is multiplied by `decay`; where the Jacobian J of the sideways motion gives more, that takes
+/// its place, min(1, (`threshold` − J) `steepness`); and what is fainter than [`FoamTick::LEAST`] is dropped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoamTick {
+    /// Time as the waves count it.
+    pub time: f64,
+    /// What is left after a tick.
+    pub decay: f32,
+    /// Jacobian below which foam comes.
+    pub threshold: f32,
+    /// Foam for each unit of the Jacobian below the threshold.
+    pub steepness: f32,
+}
+
+impl FoamTick {
+    /// Least foam there is.
+    pub const LEAST: f32 = crate::waves::fft::steps::LEAST_FOAM;
+}
+
+/// Where an instant lies among the ticks of foam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoamInstant {
+    /// The tick before.
+    pub tick: i64,
+    /// The part of the way from there to the next, in [0, 1].
+    pub part: f32,
+    /// After how many ticks all starts again.
+    pub ticks: Option<i64>,
+    /// After how many ticks nothing is left of what was.
+    pub memory: i64,
+}
+
+/// When the waves of a sea break, for those who follow its foam elsewhere.
+#[derive(Clone, Debug)]
+pub struct Breakers {
+    clock: Clock,
+    tiles: Vec<Option<Breaking>>,
+}
+
+impl Breakers {
+    /// Time as waves count it at an instant (s): seconds, or loops from 0 to 1 where the sea repeats itself.
+    pub fn time(&self, seconds: f64) -> f64 {
+        self.clock.instant(seconds).time
+    }
+
+    /// Where an instant (s) lies among the ticks of foam.
+    pub fn instant(&self, seconds: f64) -> FoamInstant {
+        let instant = self.clock.instant(seconds);
+        let memory = foam::memory(foam::decay(&instant));
+        FoamInstant { tick: instant.tick, part: instant.part, ticks: instant.ticks, memory }
+    }
+
+    /// Whether a tile makes foam.
+    pub fn makes_foam(&self, tile: usize) -> bool {
+        self.tiles.get(tile).is_some_and(Option::is_some)
+    }
+
+    /// What the foam of a tile does at a tick, if it makes any.
+    pub fn tick(&self, tile: usize, tick: i64) -> Option<FoamTick> {
+        let breaking = self.tiles.get(tile)?.as_ref()?;
+        let instant = self.clock.instant(0.0);
+        let moment = instant.at_tick(tick);
+        let foaming = breaking.foaming(&moment, foam::decay(&instant));
+        let (decay, threshold, steepness) = (foaming.decay, foaming.threshold, foaming.steepness);
+        Some(FoamTick { time: moment.time, decay, threshold, steepness })
+    }
 }
 
 impl Spectrum<'_> {
@@ -48,9 +118,14 @@ impl Spectrum<'_> {
         self.patch.grids.len()
     }
 
-    /// Variances to be expected of all waves from a level on: of their slopes in the world's axes (xx, xy, yy). 0 after the last.
+    /// Variances to be expected of the slopes of a level's waves, in the world's axes (xx, xy, yy). 0 after the last level.
     pub fn slopes(&self, level: usize) -> [f64; 3] {
         self.patch.present.get(level).map_or([0.0; 3], |all| [all[0], all[1], all[2]])
+    }
+
+    /// Variance to be expected of the heights of all its waves (m²).
+    pub fn variance(&self) -> f64 {
+        self.patch.present[0][3]
     }
 
     /// The waves of a place in the lattice; still water beyond its borders.
@@ -79,8 +154,9 @@ impl Cascades {
         self.patches.iter().map(|patch| Spectrum { patch })
     }
 
-    /// After how many seconds it repeats itself; its waves then count loops from 0 to 1.
-    pub fn period(&self) -> Option<f64> {
-        self.clock.period
+    /// When its waves break.
+    pub fn breakers(&self) -> Breakers {
+        let tiles = self.patches.iter().map(|patch| patch.foam.as_ref().map(|foam| foam.breaking.clone())).collect();
+        Breakers { clock: self.clock.clone(), tiles }
     }
 }
