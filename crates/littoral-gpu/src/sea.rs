@@ -23,6 +23,15 @@ use plan::Plan;
 use sample::SampleTile;
 use wgpu::util::DeviceExt;
 
+/// How the sums are made on a device. Both differ from the processor by no more than the module says, but not to the bit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Transform {
+    /// Step after step over all memory: for devices whose workgroups have no fast memory, such as processors that do a GPU's work.
+    Passes,
+    /// Whole lines in the memory of a workgroup: all is read and written once along each axis.
+    Lines,
+}
+
 /// A sea of tiles whose samples are in a texture of the GPU.
 ///
 /// The texture has two layers for each tile, in the order of [`Cascades::tiles`]: `(z, x, ∂x/∂x, y)` and `(∂y/∂y, ∂z/∂x, ∂x/∂y, ∂z/∂y)` in the
@@ -56,10 +65,19 @@ impl GpuSea {
     /// # Errors
     /// If the device cannot hold that many samples at once, or the sea has more than 16 tiles with foam.
     pub fn new(gpu: &Gpu, sea: &Cascades) -> Result<GpuSea, GpuError> {
+        let transform = if gpu.is_software() { Transform::Passes } else { Transform::Lines };
+        GpuSea::with_transform(gpu, sea, transform)
+    }
+
+    /// The same, summed in a way that is asked for.
+    ///
+    /// # Errors
+    /// As [`GpuSea::new`].
+    pub fn with_transform(gpu: &Gpu, sea: &Cascades, transform: Transform) -> Result<GpuSea, GpuError> {
         let device = &gpu.device;
         let tiles: Vec<Tile> = sea.tiles().copied().collect();
         let foam = Foam::new(sea.breakers(), tiles.len());
-        let plan = Plan::new(sea, &foam.tiles);
+        let plan = Plan::new(sea, &foam.tiles, transform);
         check(gpu, &plan, &foam)?;
         let layers = tiles.len().max(1) as u32;
         let side = plan.samples;
@@ -103,7 +121,7 @@ impl GpuSea {
             })
         });
         let groups = groups.collect();
-        let pipelines = pipelines(device, &layout, &plan);
+        let pipelines = pipelines(device, &layout, &plan, transform);
         let caps = Caps::new(device, of_foam, side, foam.tiles.len().max(1) as u32);
         let sample_tiles = sample::tiles(sea, &sea.breakers(), side);
         let sample_buffer = constant("sea: places", bytemuck::cast_slice(&sample_tiles), storage | copy);
@@ -458,18 +476,37 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     group_layout(device, wgpu::ShaderStages::COMPUTE, types)
 }
 
+/// The source of a transform.
+pub fn transform_source(transform: Transform) -> String {
+    let steps = match transform {
+        Transform::Passes => include_str!("shaders/sea_passes.wgsl"),
+        Transform::Lines => include_str!("shaders/sea_lines.wgsl"),
+    };
+    [include_str!("shaders/sea_waves.wgsl"), steps].join("\n")
+}
+
 /// One for each kind of pass.
-fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, plan: &Plan) -> Vec<wgpu::ComputePipeline> {
-    let module = device.create_shader_module(wgpu::include_wgsl!("shaders/sea_transform.wgsl"));
+fn pipelines(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    plan: &Plan,
+    transform: Transform,
+) -> Vec<wgpu::ComputePipeline> {
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("sea"),
+        source: wgpu::ShaderSource::Wgsl(transform_source(transform).into()),
+    });
     let make = |kind: &plan::Kind| {
+        let foam = ("FOAM", f64::from(u8::from(kind.foam)));
         let constants = [
+            foam,
             ("RADIX", f64::from(kind.radix)),
             ("FROM_WAVES", f64::from(u8::from(kind.first && !kind.along_y))),
             ("FROM_ROWS", f64::from(u8::from(kind.first && kind.along_y))),
             ("TO_SAMPLES", f64::from(u8::from(kind.last && kind.along_y))),
-            ("FOAM", f64::from(u8::from(kind.foam))),
         ];
-        pipeline(device, layout, &module, if kind.along_y { "along_y" } else { "along_x" }, &constants)
+        let constants = if transform == Transform::Passes { &constants[..] } else { &constants[..1] };
+        pipeline(device, layout, &module, if kind.along_y { "along_y" } else { "along_x" }, constants)
     };
     plan.kinds.iter().map(make).collect()
 }

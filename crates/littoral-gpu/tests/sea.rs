@@ -4,6 +4,7 @@
 use glam::DVec2;
 use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::{BLOCK, Motion, Points, SeaState, WaveModel, random};
+use littoral_gpu::sea::{Transform, transform_source};
 use littoral_gpu::{Gpu, GpuSea};
 use std::f64::consts::TAU;
 
@@ -106,8 +107,12 @@ fn samples_are_those_of_the_processor() {
         let tile = Tile { length, turn: 0.0, samples: samples_a_side, lowest: 0.03, highest };
         let options = Options { foam: false, ..Options::default() };
         let mut sea = Cascades::with_tiles(&state, &[tile], &options).expect("a sea");
-        let mut on_gpu = GpuSea::new(&gpu, &sea).expect("a sea");
-        for time in [0.0, 12.5, 86_400.0, 1e8, -1234.567] {
+        let both = [Transform::Passes, Transform::Lines];
+        let mut both = both.map(|transform| GpuSea::with_transform(&gpu, &sea, transform).expect("a sea"));
+        for (time, transform) in
+            [0.0, 12.5, 86_400.0, 1e8, -1234.567].into_iter().flat_map(|time| [(time, 0), (time, 1)])
+        {
+            let on_gpu = &mut both[transform];
             sea.set_time(time);
             on_gpu.set_time(time);
             for level in 0..on_gpu.motion().mip_level_count() {
@@ -117,7 +122,11 @@ fn samples_are_those_of_the_processor() {
                 let expected = expected(&sea, &tile, side, if level == 0 { 0.0 } else { footprint });
                 let got = samples(&gpu, on_gpu.motion(), 0, level);
                 for (f, off) in difference(&got, &expected).into_iter().enumerate() {
-                    assert!(off < TOLERANCE, "{samples_a_side} at {time}, level {level}, {}: {off}", FIELDS[f]);
+                    assert!(
+                        off < TOLERANCE,
+                        "{samples_a_side} by {transform} at {time}, level {level}, {}: {off}",
+                        FIELDS[f]
+                    );
                     worst = worst.max(off);
                 }
             }
@@ -184,16 +193,25 @@ fn a_few_waves_are_their_closed_form() {
 fn an_instant_has_the_same_bits_whatever_was_before() {
     let Some(gpu) = gpu() else { return };
     let state = SeaState::beaufort(6.0, 0.6).expect("a state");
-    let sea = Cascades::new(&state, &Options { samples: 64, foam: false, ..Options::default() }).expect("a sea");
-    let mut one = GpuSea::new(&gpu, &sea).expect("a sea");
-    let mut other = GpuSea::new(&gpu, &sea).expect("a sea");
+    let sea = Cascades::new(&state, &Options { samples: 64, ..Options::default() }).expect("a sea");
+    for transform in [Transform::Passes, Transform::Lines] {
+        unchanged_by_the_past(&gpu, &sea, transform);
+    }
+}
+
+fn unchanged_by_the_past(gpu: &Gpu, sea: &Cascades, transform: Transform) {
+    let new = || GpuSea::with_transform(gpu, sea, transform).expect("a sea");
+    let (mut one, mut other) = (new(), new());
     one.set_time(77.7);
-    other.set_time(1e6);
-    other.set_time(3.0);
-    other.set_time(77.7);
+    // A jump ahead, one back, and some ticks.
+    [1e6, 3.0, 76.2, 77.1, 77.7].into_iter().for_each(|time| other.set_time(time));
+    let places: Vec<[f32; 4]> = (0..1024_u16).map(|i| [f32::from(i % 32), f32::from(i / 32), 0.0, 0.0]).collect();
+    let [a, b] = [&one, &other].map(|sea| told(gpu, sea, &places));
+    assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| a.to_bits() == b.to_bits()));
+    assert!(a.iter().any(|told| told[11] > 0.1), "no foam");
     for tile in 0..sea.tiles().len() as u32 {
         for level in 0..one.motion().mip_level_count() {
-            let [a, b] = [&one, &other].map(|sea| samples(&gpu, sea.motion(), tile, level));
+            let [a, b] = [&one, &other].map(|sea| samples(gpu, sea.motion(), tile, level));
             assert!(a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| a.to_bits() == b.to_bits()));
             if level == 0 {
                 assert!(a.iter().any(|sample| sample[0].abs() > 1e-4), "still water");
@@ -352,7 +370,8 @@ fn places_are_told_what_the_processor_tells() {
     ] {
         let state = SeaState::beaufort(beaufort, 0.6).expect("a state");
         let mut sea = Cascades::new(&state, &options).expect("a sea");
-        let mut on_gpu = GpuSea::new(&gpu, &sea).expect("a sea");
+        let transform = if beaufort > 7.5 { Transform::Lines } else { Transform::Passes };
+        let mut on_gpu = GpuSea::with_transform(&gpu, &sea, transform).expect("a sea");
         on_gpu.set_origin(origin);
         // A jump, a tick, within a tick, some ticks, and a jump back.
         for time in [100.1, 100.3, 100.4, 103.2, 20.0] {
@@ -392,7 +411,8 @@ fn places_are_told_what_the_processor_tells() {
 #[test]
 fn shaders_are_sound() {
     let sources = [
-        include_str!("../src/shaders/sea_transform.wgsl").into(),
+        transform_source(Transform::Passes),
+        transform_source(Transform::Lines),
         include_str!("../src/shaders/sea_foam.wgsl").into(),
         littoral_gpu::sea::sample_source(3),
     ];

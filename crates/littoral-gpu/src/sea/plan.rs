@@ -1,5 +1,6 @@
 //! What is uploaded of a sea, and which passes sum it.
 
+use super::Transform;
 use littoral::waves::cascades::{Cascades, Wave};
 use std::f64::consts::TAU;
 
@@ -57,6 +58,7 @@ impl Packed {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kind {
     pub along_y: bool,
+    /// Of one step, or 0 for all steps of a line.
     pub radix: u32,
     pub first: bool,
     pub last: bool,
@@ -94,8 +96,10 @@ impl Plan {
     pub const APART: u32 = 256;
     /// Invocations in a workgroup.
     const GROUP: u32 = 64;
+    /// Numbers that the lines of a workgroup have together.
+    const NUMBERS: u32 = 1024;
 
-    pub fn new(sea: &Cascades, with_foam: &[usize]) -> Plan {
+    pub fn new(sea: &Cascades, with_foam: &[usize], transform: Transform) -> Plan {
         let samples = sea.tiles().map(|tile| tile.samples).max().unwrap_or(64) as u32;
         let levels = sea.spectra().map(|spectrum| spectrum.levels()).max().unwrap_or(1);
         let (mut tiles, mut waves, mut rows) = (Vec::new(), Vec::new(), vec![0; levels]);
@@ -122,15 +126,21 @@ impl Plan {
             let samples = plan.samples >> level;
             let mut from = 1;
             for along_y in [false, true] {
-                let radices = radices(samples);
+                let radices = match transform {
+                    Transform::Passes => radices(samples),
+                    Transform::Lines => vec![0],
+                };
                 let mut span = 1;
                 for (index, &radix) in radices.iter().enumerate() {
                     let kind =
                         Kind { along_y, radix, first: index == 0, last: index + 1 == radices.len(), foam: false };
-                    let stride = plan.samples / (span * radix);
+                    let stride = plan.samples / (span * radix.max(1));
                     let pass = Pass { samples, span, stride, rows, level: level as u32, unused: [0; 3] };
                     let lines = if along_y { samples } else { 2 * rows + 1 };
-                    let workgroups = (lines * (samples / radix)).div_ceil(Plan::GROUP);
+                    let workgroups = match transform {
+                        Transform::Passes => (lines * (samples / radix)).div_ceil(Plan::GROUP),
+                        Transform::Lines => lines.div_ceil(Plan::NUMBERS / samples),
+                    };
                     let pipeline = plan.pipeline(kind);
                     let foaming =
                         (level == 0 && !with_foam.is_empty()).then(|| plan.pipeline(Kind { foam: true, ..kind }));

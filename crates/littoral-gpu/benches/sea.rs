@@ -1,0 +1,86 @@
+//! Milliseconds that a step of the sea takes on the GPU, and on the processor beside it.
+//!
+//! `cargo bench -p littoral-gpu --bench sea`. Three tiles of 256² and of 512² samples, all levels of detail on the GPU, which the processor makes on demand
+//! (those it makes here too); wall time from before the work is submitted until it is done; medians; both alternate within one process.
+//! The bytes are what the passes read and write as they are built: over the time and the memory's speed they are the part of what is possible.
+
+use littoral::waves::cascades::{Cascades, Options, Tile};
+use littoral::waves::{Motion, Points, SeaState, WaveModel};
+use littoral_gpu::{Gpu, GpuSea};
+use std::f64::consts::TAU;
+use std::hint::black_box;
+use std::time::Instant;
+
+fn main() {
+    let gpu = match Gpu::headless() {
+        Ok(gpu) => gpu,
+        Err(error) => return println!("{error}"),
+    };
+    println!("{} ({:?})", gpu.adapter.name, gpu.adapter.backend);
+    for samples in [256, 512] {
+        for foam in [false, true] {
+            steps(&gpu, samples, foam);
+        }
+    }
+}
+
+fn steps(gpu: &Gpu, samples: usize, foam: bool) {
+    let state = SeaState::beaufort(6.0, 0.6).expect("a state");
+    // Waves of four samples and longer.
+    let carried = (samples / 4) as f64 - 0.5;
+    let mut lowest = 0.05;
+    let tiles = [0.2, 0.9, 1.4].map(|turn| {
+        let length = 7.7 * TAU / lowest;
+        let tile = Tile { length, turn, samples, lowest, highest: carried * TAU / length };
+        lowest = tile.highest;
+        tile
+    });
+    let options = Options { foam, ..Options::default() };
+    let mut sea = Cascades::with_tiles(&state, &tiles, &options).expect("a sea");
+    let mut on_gpu = GpuSea::new(gpu, &sea).expect("a sea");
+    let wait = || drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
+    wait();
+    let mut times = [const { Vec::new() }; 4];
+    // The first frames warm up. A tick of foam comes every 15 frames.
+    for frame in 0..34 {
+        let now = 100.0 + f64::from(frame) / 60.0;
+        let mut taken = [0.0; 4];
+        taken[0] = milliseconds(|| {
+            on_gpu.set_time(now);
+            wait();
+        });
+        // Until the next is submitted the processor is free.
+        taken[1] = milliseconds(|| on_gpu.set_time(now + 1e-3));
+        wait();
+        taken[2] = milliseconds(|| sea.set_time(now));
+        taken[3] = taken[2]
+            + milliseconds(|| {
+                let mut motion = Motion::STILL;
+                for width in 0..8 {
+                    let footprint = [0.05 * f32::from(1u16 << (2 * width)); 16];
+                    sea.add_displacement(&Points { footprint, ..Points::at(1.0, 2.0) }, &mut motion);
+                }
+                black_box(&motion);
+            });
+        if frame >= 4 {
+            times.iter_mut().zip(taken).for_each(|(times, taken)| times.push(taken));
+        }
+    }
+    let [gpu_all, recording, alone, with_levels] = times.map(|mut times| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    });
+    println!(
+        "3 × {samples}²{}: GPU {gpu_all:.2} ms (of which the processor records {recording:.2}), {:.1} MB: {:.2} GB/s; processor {alone:.2} ms, \
+         {with_levels:.2} with levels",
+        if foam { " with foam" } else { "" },
+        on_gpu.bytes_moved() as f64 / 1e6,
+        on_gpu.bytes_moved() as f64 / 1e6 / gpu_all,
+    );
+}
+
+fn milliseconds(work: impl FnOnce()) -> f64 {
+    let start = Instant::now();
+    work();
+    start.elapsed().as_secs_f64() * 1e3
+}
