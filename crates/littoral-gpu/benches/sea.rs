@@ -6,6 +6,7 @@
 
 use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::{Motion, Points, SeaState, WaveModel};
+use littoral_gpu::sea::Transform;
 use littoral_gpu::{Gpu, GpuSea};
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -37,23 +38,26 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
     });
     let options = Options { foam, ..Options::default() };
     let mut sea = Cascades::with_tiles(&state, &tiles, &options).expect("a sea");
-    let mut on_gpu = GpuSea::new(gpu, &sea).expect("a sea");
+    let mut on_gpu =
+        [Transform::Passes, Transform::Lines].map(|of| GpuSea::with_transform(gpu, &sea, of).expect("a sea"));
     let wait = || drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
     wait();
-    let mut times = [const { Vec::new() }; 4];
+    let mut times = [const { Vec::new() }; 5];
     // The first frames warm up. A tick of foam comes every 15 frames.
     for frame in 0..34 {
         let now = 100.0 + f64::from(frame) / 60.0;
-        let mut taken = [0.0; 4];
-        taken[0] = milliseconds(|| {
-            on_gpu.set_time(now);
-            wait();
-        });
+        let mut taken = [0.0; 5];
+        for (taken, sea) in taken.iter_mut().zip(&mut on_gpu) {
+            *taken = milliseconds(|| {
+                sea.set_time(now);
+                wait();
+            });
+        }
         // Until the next is submitted the processor is free.
-        taken[1] = milliseconds(|| on_gpu.set_time(now + 1e-3));
+        taken[2] = milliseconds(|| on_gpu[1].set_time(now + 1e-3));
         wait();
-        taken[2] = milliseconds(|| sea.set_time(now));
-        taken[3] = taken[2]
+        taken[3] = milliseconds(|| sea.set_time(now));
+        taken[4] = taken[3]
             + milliseconds(|| {
                 let mut motion = Motion::STILL;
                 for width in 0..8 {
@@ -66,16 +70,17 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
             times.iter_mut().zip(taken).for_each(|(times, taken)| times.push(taken));
         }
     }
-    let [gpu_all, recording, alone, with_levels] = times.map(|mut times| {
+    let [passes, lines, recording, alone, with_levels] = times.map(|mut times| {
         times.sort_by(f64::total_cmp);
         times[times.len() / 2]
     });
+    println!("3 × {samples}²{}", if foam { ", foam" } else { "" });
+    for (name, sea, time) in [("passes", &on_gpu[0], passes), ("lines", &on_gpu[1], lines)] {
+        let bytes = sea.bytes_moved() as f64;
+        println!("  by {name}: {time:.2} ms for {:.1} MB, {:.2} GB/s", 1e-6 * bytes, 1e-6 * bytes / time);
+    }
     println!(
-        "3 × {samples}²{}: GPU {gpu_all:.2} ms (of which the processor records {recording:.2}), {:.1} MB: {:.2} GB/s; processor {alone:.2} ms, \
-         {with_levels:.2} with levels",
-        if foam { " with foam" } else { "" },
-        on_gpu.bytes_moved() as f64 / 1e6,
-        on_gpu.bytes_moved() as f64 / 1e6 / gpu_all,
+        "  to record and submit {recording:.2} ms; on the processor {alone:.2} ms, with levels {with_levels:.2} ms"
     );
 }
 
