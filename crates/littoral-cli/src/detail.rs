@@ -11,8 +11,9 @@ use littoral::lod::{
     Drawing, Limits, Lod, Mesh, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, Strips, ViewError,
     Whole,
 };
-use littoral::picture::Meshes;
+use littoral::picture::{Meshes, Picture, Settings, Stage};
 use littoral::space::{Datum, View};
+use littoral_gpu::{Gpu, Painter, PainterError};
 use std::time::Instant;
 
 /// How a mesh is chosen.
@@ -28,8 +29,12 @@ pub struct Detail {
     #[arg(long, value_name = "N", default_value = "2000000", value_parser = clap::value_parser!(u32).range(1..=50_000_000), requires = "lod", help_heading = "Mesh")]
     pub triangles: u32,
     /// Draw the mesh's edges, too
-    #[arg(long, requires = "lod", help_heading = "Mesh")]
+    #[arg(long, requires = "lod", conflicts_with = "gpu", help_heading = "Mesh")]
     pub wireframe: bool,
+    /// Draw on the graphics card (or what stands for one): in natural colours, of an eye within the land, and so far with still water
+    /// [default mesh: patches]
+    #[arg(long, conflicts_with = "passes", help_heading = "Mesh")]
+    pub gpu: bool,
     /// Choose the mesh for an eye at this place that looks at the same point, and look at it from --eye
     #[arg(long, value_name = "X,Y,Z", value_parser = input::xyz, requires = "lod", conflicts_with = "path", help_heading = "Mesh")]
     pub lod_from: Option<DVec3>,
@@ -77,6 +82,8 @@ pub struct Chooser<'a> {
     water: Option<Box<dyn Lod>>,
     water_drawing: Drawing,
     shows_water: bool,
+    /// What draws instead of the processor.
+    painter: Option<Painter>,
 }
 
 /// What is told about a mesh.
@@ -116,7 +123,21 @@ impl Detail {
             water: None,
             water_drawing: Drawing::default(),
             shows_water: false,
+            painter: None,
         })
+    }
+
+    /// The graphics card made ready for a stage, if it is to draw.
+    pub fn painter(&self, stage: &Stage, talk: &mut Talk) -> Result<Option<Painter>, Failure> {
+        if !self.gpu {
+            return Ok(None);
+        }
+        let failed = |e: PainterError| Failure::Work(format!("--gpu: {e}"));
+        let gpu = Gpu::headless().map_err(|e| failed(e.into()))?;
+        if gpu.is_software() {
+            talk.note(format!("no graphics card: {} stands for one", gpu.adapter.name));
+        }
+        Painter::new(gpu, stage).map(Some).map_err(failed)
     }
 
     /// The view that the mesh is chosen for: the picture's, or another eye's on the same point.
@@ -165,8 +186,31 @@ impl Chooser<'_> {
         Ok(told)
     }
 
+    /// Draws on the graphics card from now on.
+    pub fn paint_with(&mut self, painter: Option<Painter>) {
+        self.painter = painter;
+    }
+
+    /// The picture of what was chosen last.
+    pub fn picture(
+        &mut self,
+        stage: &Stage,
+        sea: Option<&Sea>,
+        view: &View,
+        settings: &Settings,
+        told: &(dyn Fn(f32) + Sync),
+    ) -> Result<Picture, Failure> {
+        let Some(mut painter) = self.painter.take() else {
+            return Ok(stage.render_meshes(&self.meshes(), sea, view, settings, told));
+        };
+        let ground = self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh);
+        let painted = painter.picture(stage, ground, view, settings.samples, &|done| told(done));
+        self.painter = Some(painter);
+        painted.map_err(|e| Failure::Work(format!("--gpu: {e}")))
+    }
+
     /// What was chosen last.
-    pub fn meshes(&self) -> Meshes<'_> {
+    fn meshes(&self) -> Meshes<'_> {
         Meshes {
             ground: Some(self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)),
             water: self.shows_water.then_some(&self.water_drawing.mesh),

@@ -125,7 +125,7 @@ impl Order<'_> {
                     Some(chooser) => {
                         let told = chooser.choose(sea.filter(|_| stage.shows_waves()), &view)?;
                         mesh.get_or_insert(Told { select_seconds: 0.0, ..told }).join(told);
-                        stage.render_meshes(&chooser.meshes(), sea, &view, settings, &|_| {})
+                        chooser.picture(stage, sea, &view, settings, &|_| {})?
                     }
                     None => stage.render_sea(sea, &view, settings, &|_| {}),
                 };

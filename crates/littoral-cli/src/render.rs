@@ -1,6 +1,6 @@
 //! `littoral render`: pictures and films.
 
-use crate::detail::{Detail, Told};
+use crate::detail::{Detail, Method, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
@@ -36,6 +36,7 @@ use std::time::Instant;
   littoral render --sea beaufort=8,from=240                the coast in a storm
   littoral render --sea buoy=41010.data_spec               in the waves that a buoy measured
   littoral render dem.tif --lod quadtree --tolerance 2 --wireframe      the mesh that a method of detail draws
+  littoral render --gpu                                    drawn by the graphics card
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
   littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4
@@ -205,6 +206,9 @@ impl Render {
             check_output(save, &inputs)?;
         }
 
+        if self.detail.gpu && self.sea.is_some() {
+            talk.warn("--gpu draws still water so far: --sea is not seen".to_owned());
+        }
         let state = self.sea.as_deref().map(|spec| sea::read(spec, talk)).transpose()?;
         let (reading, full, stretch) = (self.reading, self.full, self.exaggeration);
         let subject = Subject::open(&self.files, reading, full, stretch, self.water, talk)?;
@@ -223,11 +227,17 @@ impl Render {
             ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
         };
         let stage = Stage::new(&scene);
-        let mut sea = self.waves(state.as_ref(), &subject, talk)?;
+        let mut sea = match self.detail.gpu {
+            true => None,
+            false => self.waves(state.as_ref(), &subject, talk)?,
+        };
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
             let prepared = self.detail.prepare(stage.land());
-            let chooser = self.detail.chooser(stage.land(), prepared.as_ref());
+            let mut chooser = self.detail.chooser(stage.land(), prepared.as_ref());
+            if let Some(chooser) = &mut chooser {
+                chooser.paint_with(self.detail.painter(&stage, talk)?);
+            }
             return film.run(&subject, &stage, sea.as_mut(), chooser, &settings, started, talk);
         }
 
@@ -235,10 +245,13 @@ impl Render {
         let waves = sea.as_ref().filter(|_| stage.shows_waves());
         let mut chooser = self.detail.chooser(stage.land(), None);
         let chosen = chooser.as_mut().map(|chooser| chooser.choose(waves, &mesh_view)).transpose()?;
+        if let Some(chooser) = &mut chooser {
+            chooser.paint_with(self.detail.painter(&stage, talk)?);
+        }
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
-        let picture = match &chooser {
-            Some(chooser) => stage.render_meshes(&chooser.meshes(), sea.as_ref(), &shot.view, &settings, &told),
+        let picture = match &mut chooser {
+            Some(chooser) => chooser.picture(&stage, sea.as_ref(), &shot.view, &settings, &told)?,
             None => stage.render_sea(sea.as_ref(), &shot.view, &settings, &told),
         };
         bar.finish_and_clear();
@@ -331,6 +344,9 @@ impl Render {
         {
             self.files.push(path.clone());
             self.path = Some("orbit".into());
+        }
+        if self.detail.gpu {
+            self.detail.lod.get_or_insert(Method::Patches);
         }
         match (self.style, &self.texture) {
             (Some(StyleName::Image), None) => {

@@ -5,6 +5,8 @@
 //! half of its area is void or missing, and otherwise the mean of what is known there: voids neither grow nor shrink on
 //! average, and no height is made up where less than half is known.
 
+use littoral::memory::in_large_pages;
+
 /// Averages rows, handed in one after another, onto a coarser grid.
 pub(crate) struct Reducer {
     columns: usize,
@@ -54,7 +56,7 @@ impl Reducer {
             spans: (0..out_columns).map(|index| span(index, columns, out_columns)).collect(),
             sums: vec![[0.0; 2]; out_columns],
             row: 0,
-            heights: Vec::with_capacity(out_columns * out_rows),
+            heights: in_large_pages(Vec::with_capacity(out_columns * out_rows)),
         }
     }
 

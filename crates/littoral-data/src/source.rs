@@ -4,6 +4,7 @@ use crate::formats::tiles::Encoding;
 use crate::reduce::Reducer;
 use crate::{Error, Georeference, formats};
 use littoral::field::{Raster, Window};
+use littoral::memory::in_large_pages;
 use std::path::Path;
 
 /// What a file's heights are counted from.
@@ -104,7 +105,7 @@ impl Source for MemorySource {
     }
 
     fn read(&mut self, _level: usize, window: Window) -> Result<Vec<f32>, Error> {
-        let mut heights = Vec::with_capacity(window.columns * window.rows);
+        let mut heights = in_large_pages(Vec::with_capacity(window.columns * window.rows));
         for row in window.row..window.row + window.rows {
             let start = row * self.info.columns + window.column;
             heights.extend_from_slice(&self.heights[start..start + window.columns]);
@@ -206,7 +207,7 @@ pub fn load_from(
     let Level { columns, rows } = source.levels()[level];
     let mut heights;
     if size == source.levels()[level] {
-        heights = Vec::with_capacity(columns * rows);
+        heights = in_large_pages(Vec::with_capacity(columns * rows));
         for window in bands(source, level) {
             heights.extend_from_slice(&source.read(level, window)?);
             progress((window.row + window.rows) as f32 / rows as f32);

@@ -34,6 +34,14 @@ pub enum GpuError {
         /// What there is.
         offered: String,
     },
+    /// The device went away.
+    #[error("{adapter} was lost: {reason}; begin again, or draw on the processor")]
+    Lost {
+        /// The adapter's name.
+        adapter: String,
+        /// What it said.
+        reason: String,
+    },
     /// The adapter gave no device.
     #[error("{adapter} gave no device: {reason}")]
     NoDevice {

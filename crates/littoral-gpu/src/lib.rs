@@ -3,11 +3,21 @@
 //! The caller owns device, queue and target ([`Gpu`] makes the first two for those who have none). A [`Renderer`] is made once for a device, a [`Scenery`] once
 //! for a scene made ready ([`littoral::picture::Stage`]), and each frame draws what a level-of-detail method chose ([`littoral::lod::Drawing`]).
 //!
-//! Surfaces are drawn twice over: first only how far away they are, as triangles; then every pixel is lit once, from the data and not from the triangles.
-//! So a picture costs the same light whatever the method, and two methods differ by their triangles alone.
+//! A picture takes two steps: first only how far away surfaces are, as triangles; then every pixel is lit once, from the data and not from the triangles.
+//! So light costs the same whatever the method, and pictures of two methods differ by their triangles alone.
+//!
+//! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
 mod device;
+mod frame;
+mod painter;
+mod renderer;
+mod scenery;
 pub mod sea;
 
 pub use device::{Gpu, GpuError};
+pub use frame::Look;
+pub use painter::{Painter, PainterError};
+pub use renderer::{Renderer, SHADERS, Triangles};
+pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;

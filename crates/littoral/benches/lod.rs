@@ -10,6 +10,7 @@ use glam::{DVec2, DVec3, UVec2, Vec3};
 use littoral::field::noise::Fbm;
 use littoral::field::{HeightField, Land, Raster, Sea, coast};
 use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree};
+use littoral::memory::collected;
 use littoral::space::{Datum, View};
 use littoral::waves::Superposition;
 use std::hint::black_box;
@@ -151,6 +152,6 @@ fn mountains(side: usize) -> Land {
     let step = 30_000.0 / (side - 1) as f64;
     let noise = Fbm::new(8000.0, 900.0, 10, 5);
     let at = |i: usize| DVec2::new((i % side) as f64, (i / side) as f64) * step;
-    let heights = (0..side * side).map(|i| noise.at(at(i)).value as f32).collect();
+    let heights = collected((0..side * side).map(|i| noise.at(at(i)).value as f32));
     Land::new(Raster::new(side, side, DVec2::splat(step), heights).expect("sizes are valid"))
 }

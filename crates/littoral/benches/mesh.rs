@@ -10,6 +10,7 @@ use clock::median;
 use glam::DVec2;
 use littoral::field::Raster;
 use littoral::field::noise::Fbm;
+use littoral::memory::collected;
 use littoral::mesh::measure::{measure, verify, verify_delaunay};
 use littoral::mesh::rtin::{Rtin, Scratch};
 use littoral::mesh::tiled::{Method, Tiling};
@@ -100,13 +101,13 @@ fn invented(samples: usize) -> Raster {
     let noise = Fbm::new(9000.0, 1500.0, 11, 7);
     let step = EXTENT / (samples - 1) as f64;
     let height = |i: usize| noise.at(DVec2::new((i % samples) as f64, (i / samples) as f64) * step).value as f32;
-    let heights = (0..samples * samples).map(height).collect();
+    let heights = collected((0..samples * samples).map(height));
     Raster::new(samples, samples, DVec2::splat(step), heights).expect("finite heights")
 }
 
 fn measured(path: &str) -> Raster {
     let bytes = std::fs::read(path).expect("LITTORAL_MAP names a readable file");
-    let heights: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let heights = collected(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
     let side = heights.len().isqrt();
     Raster::new(side, side, DVec2::splat(EXTENT / (side - 1) as f64), heights).expect("the heights of a square")
 }

@@ -10,6 +10,7 @@ use clock::median;
 use glam::{DVec2, DVec3, Mat3, UVec2, Vec2, Vec3};
 use littoral::field::noise::Fbm;
 use littoral::field::{Land, RangePyramid, Raster};
+use littoral::memory::collected;
 use littoral::raycast::{LocalRay, Simd};
 use littoral::space::{Ray, View};
 use std::hint::black_box;
@@ -131,13 +132,13 @@ fn invented(samples: usize) -> Land {
     let noise = Fbm::new(9000.0, 1500.0, 11, 7);
     let step = EXTENT / (samples - 1) as f64;
     let height = |i: usize| noise.at(DVec2::new((i % samples) as f64, (i / samples) as f64) * step).value as f32;
-    let heights = (0..samples * samples).map(height).collect();
+    let heights = collected((0..samples * samples).map(height));
     Land::at(Raster::new(samples, samples, DVec2::splat(step), heights).expect("finite heights"), DVec2::ZERO)
 }
 
 fn measured(path: &str) -> Land {
     let bytes = std::fs::read(path).expect("LITTORAL_MAP names a readable file");
-    let heights = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let heights = collected(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])));
     Land::at(Raster::new(4097, 4097, DVec2::splat(EXTENT / 4096.0), heights).expect("4097² heights"), DVec2::ZERO)
 }
 

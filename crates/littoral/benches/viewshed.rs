@@ -6,6 +6,7 @@
 
 use glam::DVec2;
 use littoral::field::{Land, Raster, noise::Fbm};
+use littoral::memory::collected;
 use littoral::raycast::{Curvature, Simd, Station, Viewshed};
 
 const EXTENT: f64 = 30_000.0;
@@ -28,14 +29,14 @@ fn map() -> Raster {
     let heights: Vec<f32> = match std::env::var("LITTORAL_MAP") {
         Ok(path) => {
             let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
-            bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+            collected(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])))
         }
         Err(_) => {
             let side = 2049;
             let noise = Fbm::new(8_000.0, 1_000.0, 11, 7);
             let step = EXTENT / (side - 1) as f64;
             let at = |k: usize| noise.at(DVec2::new((k % side) as f64, (k / side) as f64) * step).value as f32;
-            (0..side * side).map(at).collect()
+            collected((0..side * side).map(at))
         }
     };
     let side = heights.len().isqrt();

@@ -21,6 +21,7 @@
 pub mod field;
 pub mod flight;
 pub mod lod;
+pub mod memory;
 pub mod mesh;
 pub mod picture;
 pub mod raycast;

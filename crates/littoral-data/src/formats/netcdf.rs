@@ -8,6 +8,7 @@ use super::{Input, assume_degrees, info};
 use crate::voids::VoidRule;
 use crate::{Crs, Error, Georeference, Info, Level, Registration, Source, metres_of_unit_name};
 use littoral::field::Window;
+use littoral::memory::in_large_pages;
 use netcdf_reader::{NcFile, NcMetadataMode, NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable};
 
 /// What variables of height are called, the likely ones first.
@@ -370,7 +371,7 @@ impl Source for NetcdfSource {
 
     fn read(&mut self, _level: usize, window: Window) -> Result<Vec<f32>, Error> {
         let Window { column, row, columns, rows } = window;
-        let mut heights = Vec::with_capacity(columns * rows);
+        let mut heights = in_large_pages(Vec::with_capacity(columns * rows));
         if columns == 0 {
             return Ok(heights);
         }

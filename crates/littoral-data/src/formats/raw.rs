@@ -5,6 +5,7 @@ use super::Input;
 use crate::voids::VoidRule;
 use crate::{Error, Info, Level, Source};
 use littoral::field::{Raster, Window};
+use littoral::memory::in_large_pages;
 
 /// The machine type of one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,7 +126,7 @@ impl Source for RawSource {
 
     fn read(&mut self, _level: usize, window: Window) -> Result<Vec<f32>, Error> {
         let Layout { offset, sample, sample_stride, row_stride, south_first, .. } = self.layout;
-        let mut heights = Vec::with_capacity(window.columns * window.rows);
+        let mut heights = in_large_pages(Vec::with_capacity(window.columns * window.rows));
         if window.columns == 0 {
             return Ok(heights);
         }

@@ -21,6 +21,7 @@ mod tile;
 use crate::{Encoding, Error, Georeference, Info, Level, Source, open_as};
 use blend::Blend;
 use littoral::field::Window;
+use littoral::memory::filled;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use tile::{Reopen, Tile};
@@ -175,7 +176,7 @@ impl Source for Mosaic {
             .collect();
         let overlap = (reached.iter().enumerate())
             .any(|(count, (_, a))| reached[..count].iter().any(|(_, b)| tile::overlap(*a, *b)));
-        let mut heights = vec![f32::NAN; window.columns * window.rows];
+        let mut heights = filled(f32::NAN, window.columns * window.rows);
         if !overlap {
             for (tile, _) in reached {
                 if let Some(patch) = self.patch(tile, &lattice, window)? {

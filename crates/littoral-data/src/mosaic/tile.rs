@@ -4,6 +4,7 @@ use crate::reduce::Reducer;
 use crate::{Crs, Encoding, Error, Georeference, Info, Level, Source, open_as};
 use glam::{DAffine2, DVec2};
 use littoral::field::Window;
+use littoral::memory::filled;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -151,7 +152,7 @@ impl Tile {
             let high = (high + ALIGNED).ceil().clamp(low + 1.0, most);
             let part = samples_within(low, high);
             let samples = self.read(&way, part)?;
-            let mut heights = vec![f32::NAN; window.columns * window.rows];
+            let mut heights = filled(f32::NAN, window.columns * window.rows);
             heights.par_chunks_exact_mut(window.columns).enumerate().for_each(|(row, line)| {
                 for (column, height) in line.iter_mut().enumerate() {
                     let at = map.transform_point2(first + DVec2::new(column as f64, row as f64));

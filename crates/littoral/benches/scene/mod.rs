@@ -4,6 +4,7 @@
 use glam::DVec2;
 use littoral::field::noise::Fbm;
 use littoral::field::{Land, Raster};
+use littoral::memory::collected;
 
 const EXTENT: f64 = 30_000.0;
 const SAMPLES: usize = 4097;
@@ -21,7 +22,7 @@ fn measured(path: &str) -> Land {
     let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("cannot read {path}: {e}"));
     assert_eq!(bytes.len(), SAMPLES * SAMPLES * 4, "expected {SAMPLES}² raw f32 heights in {path}");
     let heights = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    placed(SAMPLES, heights.collect())
+    placed(SAMPLES, collected(heights))
 }
 
 /// Fractal noise.
@@ -29,7 +30,7 @@ fn invented(samples: usize) -> Land {
     let fbm = Fbm::new(8000.0, 1200.0, 12, 7);
     let step = EXTENT / (samples - 1) as f64;
     let at = |i: usize| DVec2::new((i % samples) as f64, (i / samples) as f64) * step;
-    placed(samples, (0..samples * samples).map(|i| fbm.at(at(i)).value as f32).collect())
+    placed(samples, collected((0..samples * samples).map(|i| fbm.at(at(i)).value as f32)))
 }
 
 fn placed(samples: usize, heights: Vec<f32>) -> Land {

@@ -6,6 +6,7 @@
 
 use super::pyramid::{EMPTY_HIGH, Level};
 use super::{Raster, Window};
+use crate::memory::filled;
 
 /// Highs of 8 × 8 nodes, row by row from the south-west, in the steps of the range pyramid; [`EMPTY_HIGH`] where there is no
 /// surface and beyond the raster.
@@ -51,7 +52,7 @@ impl Blocks {
                 break;
             }
         }
-        blocks.blocks = vec![Block([EMPTY_HIGH; 64]); offset];
+        blocks.blocks = filled(Block([EMPTY_HIGH; 64]), offset);
         let whole = Window { column: 0, row: 0, columns: raster.columns() - 1, rows: raster.rows() - 1 };
         blocks.edited(whole, levels, highs);
         blocks

@@ -11,6 +11,7 @@
 //! "Terrain simplification simplified", 2002 (bounds that nest are all that refinement needs).
 
 use super::{Raster, Window};
+use crate::memory::in_large_pages;
 use crate::space::Cell;
 use rayon::prelude::*;
 
@@ -41,7 +42,7 @@ impl ErrorPyramid {
         for k in 1..=u32::from(finest) {
             let columns = (raster.columns() - 1).div_ceil(1 << k);
             let rows = (raster.rows() - 1).div_ceil(1 << k);
-            let mut bounds = vec![0.0; columns * rows];
+            let mut bounds = in_large_pages(vec![0.0; columns * rows]);
             bounds.par_chunks_mut(columns).enumerate().for_each(|(y, line)| {
                 for (x, bound) in line.iter_mut().enumerate() {
                     *bound = pyramid.bound(raster, k, x, y);

@@ -13,6 +13,7 @@
 use super::blocks::Blocks;
 use super::windows::Windows;
 use super::{HeightRange, Raster, Window};
+use crate::memory::in_large_pages;
 use rayon::prelude::*;
 
 /// Where the nodes of one level lie in the flat arrays.
@@ -71,7 +72,7 @@ impl RangePyramid {
                 break;
             }
         }
-        let (lows, highs) = (vec![0; offset + 1], vec![0; offset + 1]);
+        let (lows, highs) = (in_large_pages(vec![0; offset + 1]), in_large_pages(vec![0; offset + 1]));
         let (blocks, windows) = (Blocks::default(), Windows::default());
         let mut pyramid = RangePyramid { base, step, range, levels, lows, highs, blocks, windows };
         let first = pyramid.levels[0];

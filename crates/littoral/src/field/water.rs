@@ -155,6 +155,11 @@ impl Water {
         self.open.contains(&true)
     }
 
+    /// For each sample of the land, counted row by row from the south: not 0 if it lies in the water's basin or beside it.
+    pub fn basin(&self) -> &[u8] {
+        &self.reach
+    }
+
     /// Whether a world position (m) lies in the water's basin: there it is wet wherever the ground is below
     /// [`Water::level`].
     pub fn covers(&self, at: DVec2) -> bool {

@@ -6,6 +6,7 @@
 
 use super::Window;
 use super::pyramid::{EMPTY_HIGH, Level};
+use crate::memory::filled;
 
 /// The finest level that windows are kept for.
 pub(crate) const FINEST_WINDOWS: usize = 3;
@@ -28,7 +29,7 @@ impl Windows {
             windows.levels.push(Level { offset, ..*level });
             offset += level.columns * level.rows;
         }
-        windows.highs = vec![EMPTY_HIGH; offset + 1];
+        windows.highs = filled(EMPTY_HIGH, offset + 1);
         for (n, level) in levels.iter().enumerate().skip(FINEST_WINDOWS - 1) {
             windows.renew(n, Window { column: 0, row: 0, columns: level.columns, rows: level.rows }, levels, highs);
         }

@@ -30,6 +30,7 @@ mod states;
 
 use super::{MeshError, Triangulation, tolerance};
 use crate::field::Raster;
+use crate::memory::in_large_pages;
 use grow::Growth;
 pub use grow::Scratch;
 
@@ -147,7 +148,7 @@ impl Rtin {
         let (rtin, count) = Rtin::places(size, side);
         if deviations.capacity() < count {
             // Zeros from the system cost less than zeros written.
-            deviations = vec![0.0; count];
+            deviations = in_large_pages(vec![0.0; count]);
         } else {
             deviations.clear();
             deviations.resize(count, 0.0);

@@ -187,6 +187,11 @@ impl Atmosphere {
         sum
     }
 
+    /// Sunlight by height.
+    pub fn sunlight_table(&self) -> &[Vec3] {
+        &self.sunlight
+    }
+
     /// Sunlight on a surface facing the sun at a height (m): linear Rec. 709 (klx).
     pub fn sunlight(&self, height: f32) -> Vec3 {
         let at = (height.clamp(0.0, TOP) / TOP).sqrt() * (S_HEIGHTS - 1) as f32;
@@ -281,9 +286,9 @@ pub struct Sky {
     disc_softness: f32,
 }
 
-const AZIMUTHS: usize = 16;
-const ELEVATIONS: usize = 160;
-const DISTANCES: usize = 40;
+pub(super) const AZIMUTHS: usize = 16;
+pub(super) const ELEVATIONS: usize = 160;
+pub(super) const DISTANCES: usize = 40;
 /// Distances of the slices (m) grow from here exponentially…
 const NEAR_SLICE: f32 = 150.0;
 /// … to here, beyond which nothing changes.
@@ -351,6 +356,16 @@ impl Sky {
         let cosine = direction.dot(self.sun);
         let light = light[0] * rayleigh_phase(cosine) + light[1] * mie_phase(cosine) + light[2];
         Veil { light: light.max(Vec3::ZERO), through: through.max(Vec3::ZERO) }
+    }
+
+    /// The tables of light and of what is let through.
+    pub fn into_tables(self) -> (Vec<[Vec3; 3]>, Vec<Vec3>) {
+        (self.light, self.through)
+    }
+
+    /// Radiance of the sun's disc above the air (kcd/m²).
+    pub fn disc_radiance(&self) -> Vec3 {
+        self.disc
     }
 
     /// Radiance of the sky in a direction (kcd/m²), without the sun's disc.

@@ -9,6 +9,7 @@ use super::sea::fresnel;
 use super::shade::Shaded;
 use super::skylight::irradiance;
 use super::stage::{Lens, Stage};
+use super::tables::Slab;
 use crate::field::Land;
 use crate::raycast::LocalRay;
 use glam::{DVec2, DVec3, Vec3};
@@ -46,6 +47,12 @@ impl Block {
         let (low, high) = if range.is_empty() { (0.0, 0.0) } else { (f64::from(range.low), f64::from(range.high)) };
         let thickness = 0.018 * land.extent().max_element() + 0.06 * (high - low);
         Block { low: land.origin(), high: land.origin() + land.extent(), floor: low - thickness, thickness }
+    }
+
+    /// In numbers.
+    pub fn slab(&self) -> Slab {
+        let Block { low, high, floor, thickness } = *self;
+        Slab { low, high, floor, thickness }
     }
 
     /// Where a ray crosses into the block's column of space and out of it: two distances, of which the first is negative for a ray that begins

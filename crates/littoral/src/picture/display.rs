@@ -68,8 +68,8 @@ impl Default for Display {
 }
 
 impl Picture {
-    /// A black picture of sky alone.
-    pub(super) fn empty(size: UVec2, eye: DVec3) -> Picture {
+    /// A black picture of sky alone, for those who fill it.
+    pub fn empty(size: UVec2, eye: DVec3) -> Picture {
         let pixels = size.x as usize * size.y as usize;
         Picture {
             size,

@@ -208,8 +208,28 @@ impl<'a> Ground<'a> {
         a + (b - a) * v
     }
 
+    /// The coarsest level of the pyramid.
+    pub fn levels(&self) -> usize {
+        self.means.len()
+    }
+
+    /// Which samples were cut away from a block; empty for none.
+    pub fn cut_away_samples(&self) -> &[bool] {
+        &self.cut_away
+    }
+
+    /// How far each sample is known, 255 for wholly; empty when all is.
+    pub fn known_samples(&self) -> &[u8] {
+        &self.known
+    }
+
+    /// Height (m) of trees and houses at each sample; empty where there are none.
+    pub fn standing_samples(&self) -> &[f32] {
+        &self.standing
+    }
+
     /// Heights, columns and rows of a level of the pyramid.
-    fn heights(&self, level: usize) -> (&[f32], usize, usize) {
+    pub fn heights(&self, level: usize) -> (&[f32], usize, usize) {
         match level.checked_sub(1) {
             None => {
                 let raster = self.land.raster();

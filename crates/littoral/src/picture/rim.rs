@@ -72,6 +72,12 @@ impl Rim {
         (away > 0.0).then(|| self.expected(p, border, away))
     }
 
+    /// Depth (m) and share of water to be expected at a distance (m) from a place along the border (a share of its length).
+    pub fn at(&self, along: f64, away: f64) -> Vec2 {
+        let Beyond { depth, wet, .. } = self.around(along * self.along[self.along.len() - 1], away);
+        Vec2::new(depth, wet)
+    }
+
     /// What is to be expected at a place (m from the south-western corner) so far from the nearest one of the border.
     fn expected(&self, p: DVec2, border: DVec2, away: f64) -> Beyond {
         let DVec2 { x: width, y: height } = self.extent;
@@ -84,6 +90,11 @@ impl Rim {
         } else {
             2.0 * width + height + (height - border.y)
         };
+        self.around(along, away)
+    }
+
+    /// What is to be expected so far from a place along the border.
+    fn around(&self, along: f64, away: f64) -> Beyond {
         let depth = self.mean(along, SPREAD * away).x;
         // Even at the border a few samples decide.
         let nearest = 2.0 * self.along[1].max(self.along[self.along.len() - 1] - self.along[self.along.len() - 2]);

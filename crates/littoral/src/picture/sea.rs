@@ -59,6 +59,11 @@ impl Depths {
         Depths { table }
     }
 
+    /// For each path: radiance from the water itself, per irradiance below the surface; share left of the bed's light.
+    pub fn table(&self) -> &[(Vec3, Vec3)] {
+        &self.table
+    }
+
     /// Radiance leaving the surface (kcd/m²) for irradiance `below` (klx) just under it, over a bed of this depth (m) that
     /// throws back `bed` of it. Cosines are those of sun and eye within the water.
     pub fn radiance(&self, depth: f32, sun_cosine: f32, eye_cosine: f32, below: Vec3, bed: Vec3) -> Vec3 {

@@ -10,6 +10,7 @@
 
 use super::atmosphere::{Atmosphere, Sky};
 use super::ground::Ground;
+use super::tables::Lattice;
 use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -97,6 +98,17 @@ impl Skylight {
             })
             .collect();
         grid
+    }
+
+    /// The light at the grid's points.
+    pub fn lattice(&self) -> Lattice<Light> {
+        let Skylight { origin, step, columns, rows, .. } = *self;
+        Lattice { columns, rows, origin, spacing: step, values: self.lights.clone() }
+    }
+
+    /// How much of the sun's disc each of them sees.
+    pub fn sunny_points(&self) -> &[f32] {
+        &self.sunny
     }
 
     /// Light arriving at a world position (m).

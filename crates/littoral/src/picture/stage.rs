@@ -37,6 +37,8 @@ pub struct Stage<'a> {
     pub(super) tints: Tints,
     /// The land's border, where water goes on beyond it.
     pub(super) rim: Option<Rim>,
+    /// The height (m) of which `sky` is the sky.
+    pub(super) middle: f32,
     /// Where swash may run, from the first picture with waves on.
     beach: OnceLock<Option<Beach>>,
 }
@@ -106,6 +108,7 @@ impl<'a> Stage<'a> {
             sun,
             mist,
             rim,
+            middle: middle.max(2.0),
             beach: OnceLock::new(),
         }
     }

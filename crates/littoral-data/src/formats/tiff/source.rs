@@ -11,6 +11,7 @@ use crate::formats::pam::{BandNotes, Notes};
 use crate::voids::VoidRule;
 use crate::{Crs, Error, Georeference, Info, Level, Source, VerticalDatum};
 use littoral::field::Window;
+use littoral::memory::filled;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet, VecDeque};
 use std::path::PathBuf;
@@ -298,7 +299,7 @@ impl Source for TiffSource {
 impl TiffSource {
     /// Samples of a window of a level or a mask; NaN where there are none.
     fn read_image(&mut self, level: usize, window: Window, rule: VoidRule) -> Vec<f32> {
-        let mut out = vec![f32::NAN; window.columns * window.rows];
+        let mut out = filled(f32::NAN, window.columns * window.rows);
         if out.is_empty() {
             return out;
         }

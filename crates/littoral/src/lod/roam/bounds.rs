@@ -12,6 +12,7 @@ use super::factors::{Factors, Slopes};
 use super::scan::{Item, Lens, Priority};
 use crate::field::{HeightField, Land};
 use crate::lod::ScreenMetric;
+use crate::memory::{filled, in_large_pages};
 use crate::space::{Cell, Datum};
 use rayon::prelude::*;
 
@@ -127,7 +128,10 @@ fn tiled<T: Copy + Send + Sync>(size: [u32; 2], empty: T, of: &(dyn Fn([u32; 2])
         let j = (page / pages[0]) << 4 | (tile >> 3) << 1 | at >> 2 & 1;
         if i < size[0] && j < size[1] { of([i, j]) } else { empty }
     };
-    (0..pages[0] * pages[1] * 512).into_par_iter().with_min_len(64).map(one).collect()
+    let places = pages[0] * pages[1] * 512;
+    let mut all = in_large_pages(Vec::with_capacity(places as usize));
+    (0..places).into_par_iter().with_min_len(64).map(one).collect_into_vec(&mut all);
+    all
 }
 
 /// Where the place (i, j) of a grid of so many columns is kept.
@@ -180,7 +184,7 @@ impl NestedBounds {
         }
         let side = (1usize << finest) + 1;
         let raster = land.raster();
-        let mut heights = vec![f32::NAN; side * side];
+        let mut heights = filled(f32::NAN, side * side);
         heights.par_chunks_mut(side).take(raster.rows()).enumerate().for_each(|(row, line)| {
             let own = &raster.heights()[row * raster.columns()..(row + 1) * raster.columns()];
             line[..own.len()].copy_from_slice(own);

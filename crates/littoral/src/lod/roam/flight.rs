@@ -22,6 +22,7 @@ use super::factors::Factors;
 use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use super::scratch::Search;
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
+use crate::memory::push;
 use crate::space::{Place, View};
 use glam::DVec2;
 use std::ops::Range;
@@ -280,7 +281,7 @@ impl<'a> RoamFlight<'a> {
             self.records[unused as usize] = record;
             return unused;
         }
-        self.records.push(record);
+        push(&mut self.records, record);
         self.records.len() as u32 - 1
     }
 

@@ -1,0 +1,125 @@
+//! Pictures without a window.
+
+use crate::device::{Gpu, GpuError};
+use crate::frame::Look;
+use crate::renderer::{Renderer, Triangles};
+use crate::scenery::{Scenery, TooLarge};
+use glam::{UVec2, Vec2};
+use littoral::field::HeightField;
+use littoral::lod::Mesh;
+use littoral::picture::{Picture, Stage};
+use littoral::space::{Datum, View};
+
+/// Paints what views see of a stage, as [`Stage::render_meshes`] does.
+#[derive(Debug)]
+pub struct Painter {
+    gpu: Gpu,
+    renderer: Renderer,
+    scenery: Scenery,
+    ground: Triangles,
+    white: [f32; 3],
+}
+
+/// Why a stage cannot be painted.
+#[derive(Debug, thiserror::Error)]
+pub enum PainterError {
+    /// No device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// Too many samples.
+    #[error(transparent)]
+    TooLarge(#[from] TooLarge),
+    /// A picture larger than the device's textures.
+    #[error(
+        "expected a picture of at most {most} pixels a side, which is what this graphics adapter draws, got {got}; draw it smaller, or on the processor"
+    )]
+    Picture {
+        /// Pixels asked for.
+        got: UVec2,
+        /// Most pixels along a side.
+        most: u32,
+    },
+    /// Something that it does not draw.
+    #[error("expected land in natural colours, got {got}: the GPU does not draw that yet; draw it on the processor")]
+    Unknown {
+        /// What the stage shows.
+        got: &'static str,
+    },
+}
+
+impl Painter {
+    /// A painter of a stage.
+    ///
+    /// # Errors
+    /// If the stage is not in natural colours, stands on an ellipsoid, or is larger than the device's textures.
+    pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
+        let Some(tables) = stage.tables() else {
+            return Err(PainterError::Unknown { got: "a map, or a picture laid over the ground" });
+        };
+        let Datum::Plane { origin, size } = stage.land().datum() else {
+            return Err(PainterError::Unknown { got: "an ellipsoid" });
+        };
+        let height = f64::from(stage.land().height_range().high).max(2.0);
+        let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
+        let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
+        Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), white: tables.white })
+    }
+
+    /// What paints.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times; water is still. `progress` is told the fraction done.
+    ///
+    /// # Errors
+    /// If the picture is larger than the device's textures, or the device was lost.
+    pub fn picture(
+        &mut self,
+        stage: &Stage,
+        ground: &Mesh,
+        view: &View,
+        looks: u32,
+        progress: &dyn Fn(f32),
+    ) -> Result<Picture, PainterError> {
+        let gpu = &self.gpu;
+        let most = gpu.device.limits().max_texture_dimension_2d;
+        if view.size.max_element() > most {
+            return Err(PainterError::Picture { got: view.size, most });
+        }
+        if self.scenery.wants_sky(view.eye.z) {
+            self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
+        }
+        self.ground.set(gpu, ground);
+        let looks = looks.max(1);
+        let share = 1.0 / looks as f32;
+        let mut picture = Picture::empty(view.size, view.eye);
+        picture.white = self.white;
+        let (corner, right, down) = view.frame();
+        let width = view.size.x as usize;
+        for number in 0..looks {
+            // The first through the middle; all together evenly over the pixel (M. Roberts's R2 sequence, 2018).
+            let offset = (Vec2::new(0.754_877_7, 0.569_840_3) * number as f32 + 0.5).fract() - 0.5;
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            self.renderer.draw(gpu, &mut encoder, &self.scenery, &self.ground, view, Look { offset, number });
+            gpu.queue.submit([encoder.finish()]);
+            for (i, [red, green, blue, distance]) in self.renderer.read(gpu)?.into_iter().enumerate() {
+                for (sum, seen) in picture.radiance[i].iter_mut().zip([red, green, blue]) {
+                    *sum += seen * share;
+                }
+                if distance > 0.0 {
+                    picture.coverage[i] += share;
+                }
+                if number == 0 && distance > 0.0 {
+                    let (x, y) = ((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+                    let position = (corner + right * x + down * y).normalize() * distance;
+                    picture.depth[i] = distance;
+                    picture.position[i] = position.to_array();
+                    picture.height[i] = (view.eye.z + f64::from(position.z)) as f32;
+                }
+            }
+            progress((number + 1) as f32 * share);
+        }
+        Ok(picture)
+    }
+}

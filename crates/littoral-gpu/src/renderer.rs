@@ -1,0 +1,436 @@
+//! The passes of a picture: how far away surfaces are, the light of every pixel, and the screen.
+
+use crate::device::{Gpu, GpuError};
+use crate::frame::{Look, Uniforms};
+use crate::scenery::Scenery;
+use glam::UVec2;
+use littoral::lod::{Mesh, Vertex};
+use littoral::space::View;
+
+/// Every shader with its name, as it is compiled: for tests that need no device.
+pub const SHADERS: [(&str, &str); 4] = [
+    ("surface", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/surface.wgsl"))),
+    (
+        "shade",
+        concat!(
+            include_str!("shaders/frame.wgsl"),
+            include_str!("shaders/noise.wgsl"),
+            include_str!("shaders/ground.wgsl"),
+            include_str!("shaders/air.wgsl"),
+            include_str!("shaders/natural.wgsl"),
+            include_str!("shaders/water.wgsl"),
+            include_str!("shaders/block.wgsl"),
+            include_str!("shaders/shade.wgsl"),
+        ),
+    ),
+    ("display", include_str!("shaders/display.wgsl")),
+    ("wires", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/wires.wgsl"))),
+];
+
+const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Radiance (kcd/m²), and the distance of what is seen (m), 0 for the sky.
+const RADIANCE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// Triangles of a surface on the device.
+#[derive(Debug, Default)]
+pub struct Triangles {
+    vertices: Option<wgpu::Buffer>,
+    corners: Option<wgpu::Buffer>,
+    count: u32,
+}
+
+impl Triangles {
+    /// Brings a mesh to the device, in memory used before if that is large enough.
+    pub fn set(&mut self, gpu: &Gpu, mesh: &Mesh) {
+        fill(gpu, &mut self.vertices, "vertices", VERTICES, bytemuck::cast_slice(&mesh.vertices));
+        fill(gpu, &mut self.corners, "triangles", CORNERS, bytemuck::cast_slice(&mesh.triangles));
+        self.count = 3 * mesh.triangles.len() as u32;
+    }
+
+    /// How many triangles there are.
+    pub fn len(&self) -> usize {
+        self.count as usize / 3
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+}
+
+const VERTICES: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::STORAGE);
+const CORNERS: wgpu::BufferUsages = wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE);
+
+/// Writes bytes into a buffer, making a new one half as large again where they do not fit.
+fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) {
+    let size = bytes.len() as u64;
+    let room = |buffer: &wgpu::Buffer| buffer.size() >= size;
+    let buffer = match buffer.take().filter(room) {
+        Some(kept) => buffer.insert(kept),
+        None => buffer.insert(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: (size + size / 2).next_multiple_of(256).max(256),
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })),
+    };
+    gpu.queue.write_buffer(buffer, 0, bytes);
+}
+
+/// What a picture is drawn into before it is shown.
+#[derive(Debug)]
+struct Canvas {
+    size: UVec2,
+    depth: wgpu::TextureView,
+    radiance: wgpu::Texture,
+}
+
+/// Draws sceneries. Made once for a device and the format of what is drawn to.
+#[derive(Debug)]
+pub struct Renderer {
+    surface: wgpu::RenderPipeline,
+    shade: wgpu::RenderPipeline,
+    display: wgpu::RenderPipeline,
+    wires: wgpu::RenderPipeline,
+    format: wgpu::TextureFormat,
+    sampler: wgpu::Sampler,
+    uniforms: wgpu::Buffer,
+    shown: wgpu::Buffer,
+    canvas: Option<Canvas>,
+}
+
+impl Renderer {
+    /// A renderer that draws to targets of a format: 8 bits a channel, encoded as sRGB by the format or not.
+    pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Renderer {
+        let device = &gpu.device;
+        let [surface, shade, display, wires] = SHADERS.map(|(label, source)| {
+            device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(label),
+                source: wgpu::ShaderSource::Wgsl(source.into()),
+            })
+        });
+        let attributes = wgpu::vertex_attr_array![0 => Uint32x2];
+        let height = wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32, offset: 12, shader_location: 1 };
+        let vertices = wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &[attributes[0], height],
+        };
+        let surface = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("surface"),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &surface,
+                entry_point: Some("surface"),
+                compilation_options: Default::default(),
+                buffers: &[Some(vertices)],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(true),
+                depth_compare: Some(wgpu::CompareFunction::Greater),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: None,
+            multiview_mask: None,
+            cache: None,
+        });
+        let everywhere = |label, module: &wgpu::ShaderModule, format: wgpu::TextureFormat| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(label),
+                layout: None,
+                vertex: wgpu::VertexState {
+                    module,
+                    entry_point: Some("everywhere"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: None,
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module,
+                    entry_point: Some(label),
+                    compilation_options: Default::default(),
+                    targets: &[Some(format.into())],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        let wires = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("wires"),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &wires,
+                entry_point: Some("wire"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH,
+                depth_write_enabled: Some(false),
+                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &wires,
+                entry_point: Some("drawn"),
+                compilation_options: Default::default(),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format,
+                    blend: Some(wgpu::BlendState::ALPHA_BLENDING),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        let uniform = |label, size| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        Renderer {
+            surface,
+            shade: everywhere("shade", &shade, RADIANCE),
+            display: everywhere("display", &display, format),
+            wires,
+            format,
+            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("smooth"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
+            uniforms: uniform("frame", size_of::<Uniforms>() as u64),
+            shown: uniform("shown", 32),
+            canvas: None,
+        }
+    }
+
+    /// The canvas for pictures of a size.
+    fn canvas(&mut self, gpu: &Gpu, size: UVec2) -> &Canvas {
+        let kept = self.canvas.take().filter(|canvas| canvas.size == size);
+        self.canvas.insert(kept.unwrap_or_else(|| {
+            let make = |label, format, usage| {
+                gpu.device.create_texture(&wgpu::TextureDescriptor {
+                    label: Some(label),
+                    size: wgpu::Extent3d { width: size.x.max(1), height: size.y.max(1), depth_or_array_layers: 1 },
+                    mip_level_count: 1,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                    view_formats: &[],
+                })
+            };
+            let depth = make("depth", DEPTH, wgpu::TextureUsages::empty());
+            let radiance = make("radiance", RADIANCE, wgpu::TextureUsages::COPY_SRC);
+            Canvas { size, depth: depth.create_view(&Default::default()), radiance }
+        }))
+    }
+
+    /// Records the passes that find what a view sees of a scenery with these triangles of its ground, and its light.
+    pub fn draw(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        scenery: &Scenery,
+        ground: &Triangles,
+        view: &View,
+        look: Look,
+    ) {
+        gpu.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&Uniforms::new(scenery, view, look)));
+        self.canvas(gpu, view.size);
+        let Some(canvas) = &self.canvas else { return };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("surface"),
+            color_attachments: &[],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &canvas.depth,
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        if let (Some(vertices), Some(corners), false) = (&ground.vertices, &ground.corners, ground.is_empty()) {
+            pass.set_pipeline(&self.surface);
+            let frame = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("frame"),
+                layout: &self.surface.get_bind_group_layout(0),
+                entries: &[wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() }],
+            });
+            pass.set_bind_group(0, &frame, &[]);
+            pass.set_vertex_buffer(0, vertices.slice(..));
+            pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..ground.count, 0, 0..1);
+        }
+        drop(pass);
+
+        let radiance = canvas.radiance.create_view(&Default::default());
+        let textures = [
+            &scenery.fine,
+            &scenery.coarse,
+            &scenery.known,
+            &scenery.standing,
+            &scenery.horizon,
+            &scenery.eye_light,
+            &scenery.eye_through,
+            &scenery.land_light,
+            &scenery.skylight,
+            &scenery.sunlight,
+            &scenery.basin,
+            &scenery.rim,
+            &scenery.depths,
+            &scenery.cut,
+        ]
+        .map(|texture| texture.create_view(&Default::default()));
+        let mut entries = vec![
+            wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() },
+            wgpu::BindGroupEntry { binding: 6, resource: wgpu::BindingResource::Sampler(&self.sampler) },
+            wgpu::BindGroupEntry { binding: 15, resource: wgpu::BindingResource::TextureView(&canvas.depth) },
+        ];
+        let numbers = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 18];
+        entries.extend(numbers.into_iter().zip(&textures).map(|(binding, view)| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(view),
+        }));
+        let everything = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scenery"),
+            layout: &self.shade.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shade"),
+            color_attachments: &[Some(onto(&radiance, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.shade);
+        pass.set_bind_group(0, &everything, &[]);
+        pass.draw(0..3, 0..1);
+    }
+
+    /// Records the pass that draws the edges of triangles over what was shown: onto a target of the size that was drawn. What lies behind the ground is hidden.
+    pub fn wires(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        triangles: &Triangles,
+        target: &wgpu::TextureView,
+    ) {
+        let Some(canvas) = &self.canvas else { return };
+        let (Some(vertices), Some(corners), false) = (&triangles.vertices, &triangles.corners, triangles.is_empty())
+        else {
+            return;
+        };
+        let buffers = [(0, &self.uniforms), (16, vertices), (17, corners)];
+        let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("wires"),
+            layout: &self.wires.get_bind_group_layout(0),
+            entries: &buffers
+                .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }),
+        });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("wires"),
+            color_attachments: &[Some(onto(target, wgpu::LoadOp::Load))],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &canvas.depth,
+                depth_ops: None,
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.wires);
+        pass.set_bind_group(0, &bound, &[]);
+        pass.draw(0..triangles.count, 0..1);
+    }
+
+    /// Records the pass that shows what was drawn last on a target of some size (pixels), the drawn picture stretched over all of it. `grey` is the radiance (kcd/m²) that is shown
+    /// as middle grey.
+    pub fn show(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        scenery: &Scenery,
+        grey: f32,
+        target: &wgpu::TextureView,
+        size: UVec2,
+    ) {
+        let Some(canvas) = &self.canvas else { return };
+        let stretch = canvas.size.as_vec2() / size.max(UVec2::ONE).as_vec2();
+        let encodes = if self.format.is_srgb() { 1.0 } else { 0.0 };
+        let scale = scenery.balance * (0.30 / grey.max(1e-9));
+        let shown = [scale.x, scale.y, scale.z, 0.0, encodes, stretch.x, stretch.y, 0.0];
+        gpu.queue.write_buffer(&self.shown, 0, bytemuck::cast_slice(&shown));
+        let radiance = canvas.radiance.create_view(&Default::default());
+        let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("display"),
+            layout: &self.display.get_bind_group_layout(0),
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&radiance) },
+                wgpu::BindGroupEntry { binding: 1, resource: self.shown.as_entire_binding() },
+            ],
+        });
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("display"),
+            color_attachments: &[Some(onto(target, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.display);
+        pass.set_bind_group(0, &bound, &[]);
+        pass.draw(0..3, 0..1);
+    }
+
+    /// What was drawn last, read back: for each pixel, row by row from the top left, radiance (kcd/m²) and the distance (m) of what is seen, 0 for the sky.
+    ///
+    /// # Errors
+    /// If the device was lost.
+    pub fn read(&self, gpu: &Gpu) -> Result<Vec<[f32; 4]>, GpuError> {
+        let Some(canvas) = &self.canvas else { return Ok(Vec::new()) };
+        let (width, height) = (canvas.radiance.width(), canvas.radiance.height());
+        let row = (width * 16).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: u64::from(row) * u64::from(height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            canvas.radiance.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
+            },
+            canvas.radiance.size(),
+        );
+        gpu.queue.submit([encoder.finish()]);
+        buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        let lost =
+            |e: &dyn std::fmt::Display| GpuError::Lost { adapter: gpu.adapter.name.clone(), reason: e.to_string() };
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
+        let mapped = buffer.get_mapped_range(..).map_err(|e| lost(&e))?;
+        let rows = mapped.chunks_exact(row as usize);
+        Ok(rows.flat_map(|r| bytemuck::cast_slice::<u8, [f32; 4]>(&r[..width as usize * 16])).copied().collect())
+    }
+}
+
+/// A colour attachment that keeps what is drawn.
+fn onto(view: &wgpu::TextureView, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPassColorAttachment<'_> {
+    wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+    }
+}

@@ -1,0 +1,200 @@
+// Light on and in still water: the engine's `picture::sea`, and what of `picture::shade` belongs to it.
+
+// Not 0 where ground below the water's level is wet.
+@group(0) @binding(12) var basin_map: texture_2d<f32>;
+// Beyond the land: depth (m) and share of water, by place along the border and distance from it.
+@group(0) @binding(13) var rim_map: texture_2d<f32>;
+// By length of path: radiance of the water itself; share left of the bed's light.
+@group(0) @binding(14) var depths_map: texture_2d<f32>;
+
+const INDEX = 1.34;
+
+// Whether a place lies in the water's basin.
+fn covers(rel: vec2f) -> bool {
+    let place = frame.basin.xy + rel * frame.basin.zw;
+    if any(place < vec2f(0.0)) || any(place > frame.basin_size.xy - 1.0) {
+        return frame.water.z > 0.0;
+    }
+    return textureLoad(basin_map, vec2i(round(place)), 0).x > 0.0;
+}
+
+// Depth (m) and share of water beyond the border, by how far away that is.
+struct Beyond {
+    away: f32,
+    depth: f32,
+    wet: f32,
+}
+
+fn beyond(rel: vec2f) -> Beyond {
+    let inside = clamp(rel, frame.land.xy, frame.land.zw);
+    let away = distance(rel, inside);
+    if away == 0.0 {
+        return Beyond(0.0, 0.0, 1.0);
+    }
+    let extent = frame.land.zw - frame.land.xy;
+    let p = inside - frame.land.xy;
+    var along = 2.0 * extent.x + extent.y + (extent.y - p.y);
+    if rel.y <= frame.land.y {
+        along = p.x;
+    } else if rel.x >= frame.land.z {
+        along = extent.x + p.y;
+    } else if rel.y >= frame.land.w {
+        along = extent.x + extent.y + (extent.x - p.x);
+    }
+    let size = vec2f(textureDimensions(rim_map));
+    let row = min(log(away / (frame.water.w * 1e-4) + 1.0) / 0.35, size.y - 1.0);
+    let column = along / (2.0 * (extent.x + extent.y)) * size.x;
+    let i = i32(floor(column));
+    let j = min(i32(row), i32(size.y) - 2);
+    let f = vec2f(column - floor(column), row - f32(j));
+    let n = i32(size.x);
+    let a = mix(textureLoad(rim_map, vec2i(i % n, j), 0).xy, textureLoad(rim_map, vec2i((i + 1) % n, j), 0).xy, f.x);
+    let b = mix(textureLoad(rim_map, vec2i(i % n, j + 1), 0).xy, textureLoad(rim_map, vec2i((i + 1) % n, j + 1), 0).xy, f.x);
+    let found = mix(a, b, f.y);
+    return Beyond(away, found.x, found.y);
+}
+
+// Depth of still water (m), negative where the ground is higher. Beyond the land the bed sinks on.
+fn depth_at(rel: vec2f) -> f32 {
+    let out = beyond(rel);
+    if out.away > 0.0 {
+        return out.depth + 0.03 * out.away;
+    }
+    return min(frame.water.x + frame.eye.z - mean_of(sample_of(rel), 0u), 1e4);
+}
+
+fn fresnel(cosine: f32) -> f32 {
+    let c = saturate(cosine);
+    let t = sqrt(max(1.0 - (1.0 - c * c) / (INDEX * INDEX), 0.0));
+    let s = (c - INDEX * t) / (c + INDEX * t);
+    let p = (INDEX * c - t) / (INDEX * c + t);
+    return 0.5 * (s * s + p * p);
+}
+
+// Direction within the water of a ray that meets it from above.
+fn refracted(direction: vec3f, normal: vec3f) -> vec3f {
+    let cosine = -dot(direction, normal);
+    let k = 1.0 - (1.0 - cosine * cosine) / (INDEX * INDEX);
+    return direction / INDEX + normal * (cosine / INDEX - sqrt(max(k, 0.0)));
+}
+
+struct Ripples {
+    slope: vec2f,
+    // Covariances (xx, xy, yy) of the slopes that a pixel cannot show.
+    hidden: vec3f,
+}
+
+fn bell(x: f32) -> f32 {
+    return 0.3989423 * exp(-0.5 * x * x);
+}
+
+// Share of the normal distribution below x (Abramowitz and Stegun 26.2.17).
+fn below(x: f32) -> f32 {
+    let a = abs(x);
+    let t = 1.0 / (1.0 + 0.2316419 * a);
+    let tail = bell(a) * t * (0.31938153 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429))));
+    return select(1.0 - tail, tail, x < 0.0);
+}
+
+// Mean and standard deviation of the slopes along a horizontal unit direction.
+fn along_of(r: Ripples, d: vec2f) -> vec2f {
+    let square = r.hidden.x * d.x * d.x + 2.0 * r.hidden.y * d.x * d.y + r.hidden.z * d.y * d.y;
+    return vec2f(dot(r.slope, d), sqrt(max(square, 1e-8)));
+}
+
+fn flat_of(v: vec3f) -> vec2f {
+    let l = length(v.xy);
+    return select(vec2f(1.0, 0.0), v.xy / max(l, 1e-12), l > 1e-12);
+}
+
+// Area of the facets turned towards a unit direction, as seen from there, per area of still water.
+fn seen_from(r: Ripples, eye: vec3f) -> f32 {
+    let along = along_of(r, flat_of(eye));
+    let flat_eye = length(eye.xy);
+    let above = eye.z - flat_eye * along.x;
+    let spread = max(flat_eye * along.y, 1e-6);
+    return above * below(above / spread) + spread * bell(above / spread);
+}
+
+// A slope drawn from those turned towards a unit direction (E. Heitz and E. d'Eon 2014), for two normal numbers.
+fn seen_slope(r: Ripples, eye: vec3f, random: vec2f) -> vec2f {
+    let along = flat_of(eye);
+    let across = vec2f(-along.y, along.x);
+    let m = along_of(r, along);
+    let flat_eye = length(eye.xy);
+    let edge = clamp((eye.z - flat_eye * m.x) / max(flat_eye * m.y, 1e-6), -6.0, 1e4);
+    let whole = edge * below(edge) + bell(edge);
+    let wanted = below(random.x) * whole;
+    var low = -7.0;
+    var high = min(edge, 7.0);
+    var p = clamp(random.x, low, high);
+    for (var i = 0; i < 6; i++) {
+        let off = edge * below(p) + bell(p) - wanted;
+        if off > 0.0 {
+            high = p;
+        } else {
+            low = p;
+        }
+        let next = p - off / max((edge - p) * bell(p), 1e-9);
+        p = select(0.5 * (low + high), next, next > low && next < high);
+    }
+    let covariance = along.x * (r.hidden.x * across.x + r.hidden.y * across.y) + along.y * (r.hidden.y * across.x + r.hidden.z * across.y);
+    let n = along_of(r, across);
+    let follow = covariance / m.y;
+    let left = sqrt(max(n.y * n.y - follow * follow, 0.0));
+    return along * (m.x + m.y * p) + across * (n.x + follow * p + left * random.y);
+}
+
+fn density_of(r: Ripples, slope: vec2f) -> f32 {
+    let area = max(r.hidden.x * r.hidden.z - r.hidden.y * r.hidden.y, 1e-12);
+    let d = slope - r.slope;
+    let exponent = (r.hidden.z * d.x * d.x - 2.0 * r.hidden.y * d.x * d.y + r.hidden.x * d.y * d.y) / area;
+    return exp(-0.5 * exponent) / (2.0 * PI * sqrt(area));
+}
+
+// Radiance of the sun's glitter per sunlight on a facing surface (1/sr): C. Cox and W. Munk 1954.
+fn glitter(eye: vec3f, sun: vec3f, r: Ripples) -> f32 {
+    let h = normalize(eye + sun);
+    if h.z < 0.05 {
+        return 0.0;
+    }
+    let density = density_of(r, -h.xy / h.z);
+    let lit = saturate(sun.z / max(seen_from(r, sun), 1e-4));
+    return fresnel(dot(eye, h)) * density * lit / (4.0 * max(seen_from(r, eye), 1e-3) * h.z * h.z * h.z * h.z);
+}
+
+// The ripples of a light air.
+fn ripples_at(rel: vec2f, footprint: f32) -> Ripples {
+    let lanes = patch_of(42u, rel, 0.0, 700.0, footprint, 40u)
+        + 0.7 * patch_of(43u, rel, 0.0, 190.0, footprint, 41u)
+        + 0.4 * patch_of(44u, rel, 0.0, 47.0, footprint, 44u);
+    let strength = clamp(0.85 + 1.1 * lanes, 0.25, 1.8);
+    var slope = vec2f(0.0);
+    var variance = 4.0e-4;
+    var wavelength = 17.0;
+    for (var octave = 0u; octave < 9u; octave++) {
+        let amplitude = 0.020 * strength * select(1.0, 0.45, octave < 2u);
+        let share = resolved(wavelength, footprint);
+        if share > 0.0 {
+            let g = grain(33u + octave, rel, 0.37, 50u + octave).gradient;
+            let turn = 0.35 + 0.9 * f32(octave);
+            let s = sin(turn);
+            let c = cos(turn);
+            let d = vec2f(g.x, 0.55 * g.y);
+            slope += vec2f(d.x * c - d.y * s, d.x * s + d.y * c) * (amplitude * share);
+        }
+        variance += 0.45 * amplitude * amplitude * (1.0 - share * share);
+        wavelength *= 0.53;
+    }
+    return Ripples(slope, vec3f(variance, 0.0, variance));
+}
+
+// Radiance leaving the surface for irradiance just under it, over a bed of this depth that throws back `bed` of it.
+fn from_below(depth: f32, sun_cosine: f32, eye_cosine: f32, below_surface: vec3f, bed: vec3f) -> vec3f {
+    let path = max(depth, 0.0) * (1.0 / sun_cosine + 1.05 / eye_cosine);
+    let at = min(sqrt(path / 160.0), 1.0) * 256.0;
+    let u = (at + 0.5) / 257.0;
+    let own = textureSampleLevel(depths_map, smooth_sampler, vec2f(u, 0.25), 0.0).rgb;
+    let left = textureSampleLevel(depths_map, smooth_sampler, vec2f(u, 0.75), 0.0).rgb;
+    return (own + left * bed / PI) * below_surface * 0.54;
+}
