@@ -8,8 +8,12 @@
 //! **Time.** A phase is a whole number of 2⁻³² turns: frequencies of 64 bits behind the point are multiplied by whole seconds and by parts of a second,
 //! and whole turns fall off by themselves. Phases are right to 10⁻⁹ turns at any time that a sea can stand at.
 //!
-//! **Against the processor.** Samples differ from those of [`Cascades`] by less than 2·10⁻⁶ of their field's root mean square where the device adds and multiplies
-//! as IEEE 754 says (to 2·10⁻⁵ where it only promises what WGSL asks for). Two calls on one device give the same bits.
+//! **Against the processor.** Samples differ from those of [`Cascades`] by less than 10⁻⁵ of their field's root mean square (tested for tiles of 64² to 512²,
+//! at times up to 10⁸ s; by 5·10⁻⁶ at most on Mesa's software Vulkan). Foam differs by less than 0.01. Two calls on one device give the same bits.
+//! Between samples of coarse levels [`sample_source`] differs by the error of interpolation, 2 % of the shortest waves there, for the processor
+//! never has fewer than 64 samples a side.
+//!
+//! **A sea that changes** ([`Cascades::changing`]) is uploaded as it stands.
 
 mod foam;
 mod plan;
