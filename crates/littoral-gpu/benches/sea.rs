@@ -42,11 +42,11 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
         [Transform::Passes, Transform::Lines].map(|of| GpuSea::with_transform(gpu, &sea, of).expect("a sea"));
     let wait = || drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
     wait();
-    let mut times = [const { Vec::new() }; 5];
+    let mut times = [const { Vec::new() }; 6];
     // The first frames warm up. A tick of foam comes every 15 frames.
     for frame in 0..34 {
         let now = 100.0 + f64::from(frame) / 60.0;
-        let mut taken = [0.0; 5];
+        let mut taken = [0.0; 6];
         for (taken, sea) in taken.iter_mut().zip(&mut on_gpu) {
             *taken = milliseconds(|| {
                 sea.set_time(now);
@@ -66,11 +66,16 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
                 }
                 black_box(&motion);
             });
+        taken[5] = milliseconds(|| {
+            on_gpu[0].copy(&sea);
+            gpu.queue.submit([]);
+            wait();
+        });
         if frame >= 4 {
             times.iter_mut().zip(taken).for_each(|(times, taken)| times.push(taken));
         }
     }
-    let [passes, lines, recording, alone, with_levels] = times.map(|mut times| {
+    let [passes, lines, recording, alone, with_levels, copied] = times.map(|mut times| {
         times.sort_by(f64::total_cmp);
         times[times.len() / 2]
     });

@@ -13,15 +13,17 @@
 //! Between samples of coarse levels [`sample_source`] differs by the error of interpolation, 2 % of the shortest waves there, for the processor
 //! never has fewer than 64 samples a side.
 //!
-//! **A sea that changes** ([`Cascades::changing`]) is uploaded as it stands.
+//! **A sea that changes** ([`Cascades::changing`]) is uploaded as it stands; [`GpuSea::copy`] follows it.
 
 mod foam;
 mod plan;
 mod sample;
+mod upload;
 
 use crate::{Gpu, GpuError};
 use foam::{Foam, Moment};
 use glam::DVec2;
+use littoral::waves::WaveModel;
 use littoral::waves::cascades::{Cascades, Tile};
 use plan::Plan;
 use sample::SampleTile;
@@ -39,7 +41,8 @@ pub enum Transform {
 /// A sea of tiles whose samples are in a texture of the GPU.
 ///
 /// The texture has two layers for each tile, in the order of [`Cascades::tiles`]: `(z, x, ∂x/∂x, y)` and `(∂y/∂y, ∂z/∂x, ∂x/∂y, ∂z/∂y)` in the
-/// tile's own axes, texel (i, j) at (i, j) · length / samples from the tile's corner. All layers have the samples of the tile that has most.
+/// tile's own axes, texel (i, j) at (i, j) · length / samples from the tile's corner. All layers have the samples of the tile that has most, but after
+/// [`GpuSea::copy`] each tile has its own in the corner of its layers.
 pub struct GpuSea {
     gpu: Gpu,
     plan: Plan,
@@ -56,6 +59,8 @@ pub struct GpuSea {
     sample_layout: wgpu::BindGroupLayout,
     sample_group: wgpu::BindGroup,
     seconds: f64,
+    /// Whether the samples are the processor's.
+    copied: bool,
 }
 
 impl GpuSea {
@@ -154,6 +159,7 @@ impl GpuSea {
             sample_layout,
             sample_group,
             seconds: f64::NAN,
+            copied: false,
         };
         sea.set_origin(DVec2::ZERO);
         sea.set_time(0.0);
@@ -164,8 +170,13 @@ impl GpuSea {
     /// of this instant.
     pub fn set_time(&mut self, seconds: f64) {
         let seconds = if seconds.is_nan() { 0.0 } else { seconds.clamp(-1e9, 1e9) };
-        if seconds == self.seconds || self.plan.tiles.is_empty() {
+        if (seconds == self.seconds && !self.copied) || self.plan.tiles.is_empty() {
             return;
+        }
+        if self.copied {
+            let samples = self.plan.samples;
+            self.tell_samples(|_| samples);
+            self.copied = false;
         }
         self.seconds = seconds;
         let newer = self.foam.newer();
@@ -210,6 +221,32 @@ impl GpuSea {
                 return;
             }
         }
+    }
+
+    /// Takes over the samples and foam of the sea that it was made from, where that stands, instead of making them: where a processor does the GPU's work,
+    /// its own transforms are several times faster than shaders that imitate a GPU's. `false`, and nothing done, for a sea of other tiles.
+    pub fn copy(&mut self, sea: &Cascades) -> bool {
+        if !sea.tiles().eq(&self.tiles) {
+            return false;
+        }
+        for (index, spectrum) in sea.spectra().enumerate() {
+            for level in 0..spectrum.levels() {
+                upload::motion(&self.gpu.queue, &self.motion, index as u32, level as u32, &spectrum);
+            }
+            if let Some(layer) = self.foam.tiles.iter().position(|tile| *tile == index) {
+                upload::foam(&self.gpu.queue, &self.caps.shown, layer as u32, &spectrum);
+            }
+        }
+        self.seconds = sea.time();
+        self.copied = true;
+        self.tell_samples(|tile| tile.samples as u32);
+        true
+    }
+
+    /// Tells shaders how many samples tiles have.
+    fn tell_samples(&mut self, of: impl Fn(&Tile) -> u32) {
+        self.sample_tiles.iter_mut().zip(&self.tiles).for_each(|(to, tile)| to.samples = of(tile));
+        self.gpu.queue.write_buffer(&self.sample_buffer, 0, bytemuck::cast_slice(&self.sample_tiles));
     }
 
     /// The instant it stands at (s).
@@ -369,7 +406,8 @@ fn texture(
         format,
         usage: wgpu::TextureUsages::STORAGE_BINDING
             | wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_SRC,
+            | wgpu::TextureUsages::COPY_SRC
+            | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     })
 }

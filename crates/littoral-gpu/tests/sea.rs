@@ -409,6 +409,41 @@ fn places_are_told_what_the_processor_tells() {
 }
 
 #[test]
+fn copied_samples_are_those_of_the_processor() {
+    let Some(gpu) = gpu() else { return };
+    let state = SeaState::beaufort(7.0, 0.6).expect("a state");
+    // The first tile has fewer samples than the others, and coarse levels have more on the processor.
+    let options = Options { samples: 256, ..Options::default() };
+    let mut sea = Cascades::new(&state, &options).expect("a sea");
+    assert!(sea.tiles().any(|tile| tile.samples == 128));
+    let mut on_gpu = GpuSea::new(&gpu, &sea).expect("a sea");
+    let places: Vec<[f32; 4]> = (0..1024_u16)
+        .map(|i| [f32::from(i % 32) * 1.7, f32::from(i / 32) * 2.3, if i % 2 == 0 { 0.0 } else { 0.7 }, 0.0])
+        .collect();
+    on_gpu.set_time(40.0);
+    sea.set_time(7.25);
+    assert!(on_gpu.copy(&sea) && on_gpu.time() == 7.25);
+    // Where everything is asked for, and over footprints, which also see samples of coarse levels that are fewer here.
+    let compare = |on_gpu: &GpuSea, tolerances: [f64; 2]| {
+        let (got, expected) = (told(&gpu, on_gpu, &places), asked(&sea, DVec2::ZERO, &places));
+        for field in [0, 1, 2, 3, 4, 8, 9, 10, 11] {
+            let rms = (expected.iter().map(|e| f64::from(e[field]).powi(2)).sum::<f64>() / 1024.0).sqrt();
+            for ((place, g), e) in places.iter().zip(&got).zip(&expected) {
+                let off = (f64::from(g[field]) - f64::from(e[field])).abs();
+                let tolerance = tolerances[usize::from(place[2] > 0.0)];
+                assert!(off < tolerance * rms + 1e-6, "{field}: {off} of {rms}");
+            }
+        }
+    };
+    compare(&on_gpu, [1e-3, 0.03]);
+    // Back to its own: the foam of this instant, and tiles of equal samples.
+    on_gpu.set_time(7.25);
+    compare(&on_gpu, [0.03; 2]);
+    let other = Cascades::new(&SeaState::beaufort(3.0, 0.6).expect("a state"), &options).expect("a sea");
+    assert!(!on_gpu.copy(&other));
+}
+
+#[test]
 fn shaders_are_sound() {
     let sources = [
         transform_source(Transform::Passes),

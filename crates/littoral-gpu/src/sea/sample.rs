@@ -18,7 +18,7 @@ pub struct SampleTile {
     foam: i32,
     raised: f32,
     torn: f32,
-    samples: u32,
+    pub samples: u32,
     unused: u32,
     slopes: [[f32; 4]; LEVELS],
 }

@@ -33,7 +33,7 @@ mod tests;
 mod velocity;
 
 pub use plan::Tile;
-pub use spectrum::{Breakers, FoamInstant, FoamTick, Spectrum, Wave};
+pub use spectrum::{Breakers, FoamInstant, FoamTick, Samples, Spectrum, Wave};
 
 use super::fft::steps::Run;
 use super::model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};

@@ -140,6 +140,18 @@ impl Foam {
         self.shown[(y / LANES) * self.samples + x][y % LANES]
     }
 
+    /// The mean over 2^`level` samples along each side; over all of them from the last level on.
+    pub fn mean(&self, level: usize, x: usize, y: usize) -> f32 {
+        let level = level.min(self.levels());
+        let size = self.samples >> level;
+        let (x, y) = (x % size, y % size);
+        if level == 0 {
+            return self.at(x, y);
+        }
+        // n²/4 (1 + 1/4 + …) numbers come before a level.
+        self.means()[(self.samples * self.samples - 4 * size * size) / 3 + y * size + x]
+    }
+
     /// Number of coarser levels.
     pub fn levels(&self) -> usize {
         self.samples.ilog2() as usize

@@ -4,6 +4,7 @@ use super::clock::Clock;
 use super::foam::{self, Breaking};
 use super::patch::Patch;
 use super::{Cascades, Tile};
+use crate::waves::fft::steps::motion_stride;
 
 /// Two waves that run against each other over a tile, k and −k.
 ///
@@ -27,6 +28,17 @@ pub struct Wave {
 #[derive(Clone, Copy)]
 pub struct Spectrum<'a> {
     patch: &'a Patch,
+}
+
+/// Samples of a tile: see [`Spectrum::samples`].
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a> {
+    /// Along a side.
+    pub side: usize,
+    /// Numbers from row to row.
+    pub stride: usize,
+    /// All of them.
+    pub numbers: &'a [f32],
 }
 
 /// How the foam of a tile comes and goes at a tick: what was there is multiplied by `decay`; where the Jacobian J of the sideways motion gives more, that takes
@@ -126,6 +138,21 @@ impl Spectrum<'_> {
     /// Variance to be expected of the heights of all its waves (m²).
     pub fn variance(&self) -> f64 {
         self.patch.present[0][3]
+    }
+
+    /// Samples of a level of detail at the instant where the sea stands: rows from south to north of `side` samples each, and one more, the first of the row again; eight
+    /// numbers to a sample, (z, x, ∂x/∂x, y, ∂y/∂y, ∂z/∂x, ∂x/∂y, ∂z/∂y) in the tile's own axes. Levels are made when they are first asked for; none after
+    /// the last.
+    pub fn samples(&self, level: usize) -> Option<Samples<'_>> {
+        let grid = self.patch.grids.get(level)?;
+        let stride = 16 * motion_stride(grid.samples());
+        Some(Samples { side: grid.samples(), stride, numbers: self.patch.level(level) })
+    }
+
+    /// Foam at the instant where the sea stands, at a column and row of samples of the finest level, or on the mean over 2^`level` of them along each
+    /// side; 0 for tiles without.
+    pub fn foam(&self, level: usize, column: usize, row: usize) -> f32 {
+        self.patch.foam.as_ref().map_or(0.0, |foam| foam.mean(level, column, row))
     }
 
     /// The waves of a place in the lattice; still water beyond its borders.
