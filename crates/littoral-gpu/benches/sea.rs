@@ -85,7 +85,7 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
         println!("  by {name}: {time:.2} ms for {:.1} MB, {:.2} GB/s", 1e-6 * bytes, 1e-6 * bytes / time);
     }
     println!(
-        "  to record and submit {recording:.2} ms; on the processor {alone:.2} ms, with levels {with_levels:.2} ms"
+        "  to record and submit {recording:.2} ms; on the processor {alone:.2} ms, with levels {with_levels:.2} ms, and {copied:.2} ms to copy its samples"
     );
 }
 
