@@ -44,6 +44,7 @@ pub struct Scenery {
     pub(crate) basin_origin: DVec2,
     pub(crate) basin_spacing: DVec2,
     pub(crate) basin_size: UVec2,
+    pub(crate) has_lakes: bool,
     pub(crate) land: (DVec2, DVec2),
     pub(crate) skylight_origin: DVec2,
     pub(crate) skylight_spacing: DVec2,
@@ -105,7 +106,14 @@ impl Scenery {
             false => make("known", TextureFormat::R8Unorm, map, &tables.known),
         };
         let nowhere = Lattice { columns: 1, rows: 1, origin: DVec2::ZERO, spacing: DVec2::ONE, values: vec![0] };
-        let basin = tables.water.as_ref().map_or(&nowhere, |water| &water.1);
+        let has_lakes = !tables.lakes.values.is_empty();
+        let lakes = if has_lakes { &tables.lakes } else { &nowhere };
+        let basin = tables.water.as_ref().map_or(lakes, |water| &water.1);
+        let wet: Vec<u8> = (0..basin.values.len())
+            .flat_map(|i| {
+                [if tables.water.is_some() { basin.values[i] } else { 0 }, if has_lakes { lakes.values[i] } else { 0 }]
+            })
+            .collect();
         let basin_size = UVec2::new(basin.columns as u32, basin.rows as u32);
         let rim: Vec<f32> = match tables.rim.values.is_empty() {
             true => vec![0.0, 0.0, 0.0, 0.0],
@@ -159,7 +167,7 @@ impl Scenery {
                 [tables.sunlight.len() as u32, 1, 1],
                 bytemuck::cast_slice(&halves(tables.sunlight.iter().map(|&s| (s, 0.0)))),
             ),
-            basin: make("basin", TextureFormat::R8Unorm, [basin_size.x, basin_size.y, 1], &basin.values),
+            basin: make("basin", TextureFormat::Rg8Unorm, [basin_size.x, basin_size.y, 1], &wet),
             rim: make("rim", TextureFormat::Rg32Float, rim_size, bytemuck::cast_slice(&rim)),
             depths: make("depths", half, [tables.depths.len() as u32, 2, 1], bytemuck::cast_slice(&halves(depths))),
             cut: match tables.cut_away.is_empty() {
@@ -187,6 +195,7 @@ impl Scenery {
             basin_origin: basin.origin,
             basin_spacing: basin.spacing,
             basin_size,
+            has_lakes,
             land: tables.land,
             skylight_origin: tables.skylight.origin,
             skylight_spacing: tables.skylight.spacing,

@@ -1,9 +1,10 @@
 //! Pictures of the GPU against those of the processor's rays: the same light, the same ground, no cracks.
 
-use glam::UVec2;
-use littoral::field::{Land, Water, coast};
+use glam::{DVec2, DVec3, UVec2};
+use littoral::field::noise::Fbm;
+use littoral::field::{Lakes, Land, Raster, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Mesh, Patches};
-use littoral::picture::{Display, Exposure, Scene, Settings, Stage, Sun, coast_shot};
+use littoral::picture::{Border, Display, Exposure, Scene, Settings, Stage, Style, Sun, coast_shot, overhead};
 use littoral::space::View;
 use littoral_gpu::{Gpu, Painter};
 
@@ -25,8 +26,9 @@ fn mesh(land: &Land, view: &View) -> Mesh {
     drawing.mesh
 }
 
+/// Compares two pictures; where `LITTORAL_PICTURES` names a folder they are written there side by side.
 /// Mean difference of displayed values, in steps of 255, and the share of pixels that differ by more than 24 steps in any channel.
-fn apart(stage: &Stage, painter: &mut Painter, view: &View) -> (f64, f64) {
+fn apart(name: &str, stage: &Stage, painter: &mut Painter, view: &View) -> (f64, f64) {
     let mesh = mesh(stage.land(), view);
     let settings = Settings { samples: 8, ..Settings::default() };
     let expected = stage.render(view, &settings, &|_| {});
@@ -43,6 +45,14 @@ fn apart(stage: &Stage, painter: &mut Painter, view: &View) -> (f64, f64) {
         let whole = [i, i - 1, i + 1, i - width, i + width].iter().all(|&k| expected.coverage[k] == 1.0);
         assert!(!whole || painted.coverage[i] > 0.999, "sky within the ground at {}, {}", i % width, i / width);
     }
+    if let Ok(folder) = std::env::var("LITTORAL_PICTURES") {
+        let rows = a.chunks(width).zip(b.chunks(width));
+        let pixels: Vec<[u8; 3]> = rows.flat_map(|(a, b)| [a, b].concat()).collect();
+        let file = std::fs::File::create(format!("{folder}/twins_{name}.png")).expect("a file");
+        let mut encoder = png::Encoder::new(file, 2 * view.size.x, view.size.y);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.write_header().and_then(|mut w| w.write_image_data(pixels.as_flattened())).expect("a picture");
+    }
     (mean, far)
 }
 
@@ -53,7 +63,7 @@ fn the_coast_looks_as_rays_see_it() {
     let land = coast::coast();
     let water = Water::flood(&land, 0.0);
     let shot = coast_shot(size);
-    let low = View::looking_at(shot.view.eye, shot.view.eye + glam::DVec3::new(-300.0, 500.0, -60.0), 0.9, size);
+    let low = View::looking_at(shot.view.eye, shot.view.eye + DVec3::new(-300.0, 500.0, -60.0), 0.9, size);
     for (name, sun, views) in
         [("afternoon", shot.sun, &[shot.view, low][..]), ("low sun", Sun::new(5.2, 0.06), &[shot.view][..])]
     {
@@ -61,7 +71,7 @@ fn the_coast_looks_as_rays_see_it() {
         let stage = Stage::new(&scene);
         let mut painter = Painter::new(gpu.clone(), &stage).expect("a natural scene");
         for view in views {
-            let (mean, far) = apart(&stage, &mut painter, view);
+            let (mean, far) = apart(name, &stage, &mut painter, view);
             eprintln!("{name}: mean difference {mean:.2} of 255, {:.2} % of pixels far off", 100.0 * far);
             assert!(mean < 4.0 && far < 0.02, "{name}: {mean} of 255 in the mean, {far} of pixels far off");
         }
@@ -82,7 +92,45 @@ fn the_same_picture_twice_and_nothing_from_a_map() {
     let first = paint();
     assert_eq!(first, paint());
     assert!(first.iter().flatten().all(|v| v.is_finite()) && first.iter().any(|v| v[0] > 0.1));
-    let map = Scene { style: littoral::picture::Style::Tint, ..scene };
+    let map = Scene { style: Style::Tint, ..scene };
     let refused = Painter::new(gpu, &Stage::new(&map)).expect_err("maps are drawn by the processor");
     assert!(refused.to_string().contains("natural colours"), "{refused}");
+}
+
+#[test]
+fn a_block_with_missing_corners_looks_as_rays_see_it() {
+    let Some(gpu) = gpu() else { return };
+    // Hills, a sea in the west, a lake in the middle; two corners are void.
+    let (side, spacing) = (193, 30.0);
+    let fbm = Fbm::new(2200.0, 260.0, 8, 3);
+    let height = |i: usize| {
+        let (x, y) = ((i % side) as f64, (i / side) as f64);
+        let at = DVec2::new(x, y) * spacing;
+        let corner = x + y < 40.0 || x + y > 350.0;
+        let away = (at - DVec2::splat(96.0 * spacing)).length();
+        let hills = fbm.at(at).value + 1.4 * x - 60.0;
+        match () {
+            _ if corner => f32::NAN,
+            _ if away < 500.0 => 60.0,
+            _ if away < 650.0 => hills.max(80.0) as f32,
+            _ => hills as f32,
+        }
+    };
+    let heights: Vec<f32> = (0..side * side).map(height).collect();
+    let raster = Raster::new(side, side, DVec2::splat(spacing), heights).expect("valid");
+    let land = Land::new(raster);
+    let water = Water::flood(&land, 0.0);
+    let lakes = Lakes::find(&land, water.as_ref());
+    assert!(water.is_some() && lakes.is_some());
+    let size = UVec2::new(256, 144);
+    let shot = overhead(&land, water.as_ref(), size);
+    let eye = DVec3::new(-4000.0, -8000.0, 4500.0);
+    let view = View::looking_at(eye, DVec3::ZERO, 0.6, size);
+    let scene = Scene { lakes: lakes.as_ref(), ..Scene::for_shot(&land, water.as_ref(), &shot) };
+    let scene = Scene { style: Style::Natural, border: Border::Cut, sun: Sun::new(4.2, 0.5), ..scene };
+    let stage = Stage::new(&scene);
+    let mut painter = Painter::new(gpu, &stage).expect("a natural scene");
+    let (mean, far) = apart("block", &stage, &mut painter, &view);
+    eprintln!("block: mean difference {mean:.2} of 255, {:.2} % of pixels far off", 100.0 * far);
+    assert!(mean < 4.0 && far < 0.03, "{mean} of 255 in the mean, {far} of pixels far off");
 }

@@ -6,6 +6,11 @@ struct Noise {
     // Those of the eye: lattice point, and what is left.
     cell: vec2i,
     rest: vec2f,
+    // Wavelength (m); its third coordinates a metre of height; seed.
+    wavelength: f32,
+    upward: f32,
+    seed: u32,
+    unused: u32,
 }
 
 struct Frame {
@@ -15,9 +20,9 @@ struct Frame {
     corner: vec4f,
     right: vec4f,
     down: vec4f,
-    // Lattice point of the eye.
+    // Lattice point of the eye, or the land's nearest to it.
     eye_steps: vec4u,
-    // Metres a step; what is left of the eye in steps.
+    // Metres a step; how far the eye is beyond that point, in steps.
     step: vec4f,
     // The eye among the samples (columns, rows); its height (m); mean distance of samples (m).
     eye: vec4f,
@@ -35,6 +40,7 @@ struct Frame {
     water: vec4f,
     // The eye among the samples of the water's basin; samples a metre.
     basin: vec4f,
+    // Its columns and rows; whether there are lakes.
     basin_size: vec4f,
     // The land's rectangle from the eye (m).
     land: vec4f,

@@ -80,7 +80,8 @@ fn piece_seen(direction: vec3f, rel: vec3f, distance: f32) -> Piece {
         mean_of(place + vec2f(0.0, size), level) - mean_of(place - vec2f(0.0, size), level),
     ) * frame.map.xy / (2.0 * size);
     let footprint = footprint_of(distance, -dot(direction, normal_of_slope(slope)));
-    return Piece(rel.xy, frame.eye.z + rel.z, footprint);
+    // The height is the data's: a mesh may lie above or below.
+    return Piece(rel.xy, mean_of(place, 0u), footprint);
 }
 
 // How far a ray from `rel` at a height goes before the land rises into its way (m); negative if it does not.
@@ -96,7 +97,7 @@ fn march(rel: vec2f, height: f32, direction: vec3f) -> f32 {
             return -1.0;
         }
         let level = u32(clamp(log2(0.06 * t / frame.eye.w), 0.0, f32(frame.has.x)));
-        if mean_of(place, level) > height + direction.z * t {
+        if mean_of(place, level) > height + direction.z * t && !is_cut_away(rel + direction.xy * t) {
             return 0.5 * (last + t);
         }
         last = t;
@@ -124,13 +125,15 @@ struct Water {
     under: vec2f,
     // Cosine of the bent ray.
     down: f32,
+    // Distance to the shore of a lake (m), negative for the sea.
+    lake: f32,
     // Unit vector to what is mirrored, how much of it comes back, and how far away it is (m), negative for the sky.
     mirrored: vec3f,
     share: f32,
     reach: f32,
 }
 
-fn water_at(direction: vec3f, rel: vec3f, distance: f32, pixel: vec2f) -> Water {
+fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: f32, pixel: vec2f) -> Water {
     let eye = -direction;
     let ripples = ripples_at(rel.xy, footprint_of(distance, eye.z));
     let shown = normal_of_slope(ripples.slope);
@@ -151,8 +154,12 @@ fn water_at(direction: vec3f, rel: vec3f, distance: f32, pixel: vec2f) -> Water 
     // A ray thrown down into the next ripple comes up again, a little higher.
     mirrored.z = select(max(mirrored.z, 0.004), 0.02 - 0.5 * mirrored.z, mirrored.z < 0.0);
     mirrored = normalize(mirrored);
-    let reach = march(rel.xy, frame.eye.z + frame.water.x, mirrored);
-    return Water(ripples, depth, under, down, mirrored, fresnel(dot(facet, eye)), reach);
+    let reach = march(rel.xy, frame.eye.z + rel.z, mirrored);
+    if lake >= 0.0 {
+        // Of a lake only the surface is known: its bed falls off from the shore.
+        depth = min(0.07 * lake, 30.0);
+    }
+    return Water(ripples, depth, under, down, lake, mirrored, fresnel(dot(facet, eye)), reach);
 }
 
 @fragment
@@ -176,11 +183,18 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
         if any(at < frame.land.xy) || any(at > frame.land.zw) {
             t = select(curved(rise, direction), -1.0, has_block());
         }
-        if t > 0.0 && t <= distance * (1.0 + 1e-6) && covers(direction.xy * t) {
+        // From far away distances are too coarse to tell water from ground beside it, heights are not.
+        let is_before = t <= distance * (1.0 + 1e-6) || (t > 1e5 && mean_of(sample_of(direction.xy * t), 0u) <= frame.eye.z + frame.water.x);
+        if t > 0.0 && is_before && covers(direction.xy * t) {
             is_water = true;
             distance = t;
             rel = direction * t;
         }
+    }
+    var lake = -1.0;
+    if !is_water && distance < 1e29 {
+        lake = lake_at(rel.xy);
+        is_water = lake >= 0.0 && !is_side(rel.xy);
     }
     if !is_water && has_block() {
         let is_ground = distance < 1e29;
@@ -213,17 +227,17 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
     var pieces: array<Piece, 2>;
     var wanted = vec2<bool>(false);
     if is_water {
-        water = water_at(direction, rel, distance, position.xy);
+        water = water_at(direction, rel, distance, lake, position.xy);
         let inside = clamp(water.under, frame.land.xy, frame.land.zw);
         let footprint = max(footprint_of(distance, -direction.z), 0.6 * length(water.under - inside));
         pieces[0] = Piece(inside, frame.water.x + frame.eye.z - water.depth, footprint);
-        pieces[1] = Piece(rel.xy + water.mirrored.xy * water.reach, frame.water.x + frame.eye.z + water.mirrored.z * water.reach, 2.0 * frame.eye.w);
-        wanted = vec2<bool>((water.depth < 45.0), (water.reach > 0.0));
+        pieces[1] = Piece(rel.xy + water.mirrored.xy * water.reach, frame.eye.z + rel.z + water.mirrored.z * water.reach, 2.0 * frame.eye.w);
+        wanted = vec2<bool>((water.depth < 45.0 && lake < 0.0), (water.reach > 0.0));
     } else if known_at(rel.xy) > 0.0 {
         pieces[0] = piece_seen(direction, rel, distance);
         wanted.x = true;
     }
-    var bed = vec3f(0.1);
+    var bed = select(vec3f(0.1), vec3f(0.09, 0.08, 0.055), lake >= 0.0);
     var mirrored_land = vec3f(0.0);
     for (var i = 0; i < 2; i++) {
         if !wanted[i] {
@@ -268,9 +282,10 @@ fn water_seen(water: Water, direction: vec3f, rel: vec3f, bed: vec3f, mirrored_l
     let sun_within = -refracted(-frame.sun.xyz, vec3f(0.0, 0.0, 1.0));
     let sun = max(frame.sun.z, 0.0);
     let direct_share = select(1.0, sun_seen(rel.xy), all(rel.xy >= frame.land.xy) && all(rel.xy <= frame.land.zw));
-    let direct = sunlight(0.0) * (sun * (1.0 - fresnel(sun)) * direct_share);
+    let direct = sunlight(frame.eye.z + rel.z) * (sun * (1.0 - fresnel(sun)) * direct_share);
     let diffuse = irradiance_open(vec3f(0.0, 0.0, 1.0)) * 0.93;
-    let up = from_below(water.depth, max(sun_within.z, 0.5), water.down, direct + diffuse, bed);
+    let down = select(water.down, 0.8, water.lake >= 0.0);
+    let up = from_below(water.depth, max(sun_within.z, 0.5), down, direct + diffuse, bed);
     var mirrored = sky_over_land(water.mirrored);
     if water.reach > 0.0 {
         mirrored = mirrored_land;
@@ -285,5 +300,6 @@ fn water_seen(water: Water, direction: vec3f, rel: vec3f, bed: vec3f, mirrored_l
     if frame.sun.z > 0.0 {
         light += sunlight(0.0) * (glitter(-direction, frame.sun.xyz, water.ripples) * film * direct_share);
     }
-    return mix(frame.mist.rgb, light, step_between(0.15, 0.85, beyond(rel.xy).wet));
+    let open = select(step_between(0.15, 0.85, beyond(rel.xy).wet), known_at(rel.xy), water.lake >= 0.0);
+    return mix(frame.mist.rgb, light, open);
 }

@@ -1,6 +1,6 @@
 // Light on and in still water: the engine's `picture::sea`, and what of `picture::shade` belongs to it.
 
-// Not 0 where ground below the water's level is wet.
+// Red: not 0 where ground below the water's level is wet; green: distance to the shore of a lake in samples, over 255, 0 where there is none.
 @group(0) @binding(12) var basin_map: texture_2d<f32>;
 // Beyond the land: depth (m) and share of water, by place along the border and distance from it.
 @group(0) @binding(13) var rim_map: texture_2d<f32>;
@@ -16,6 +16,36 @@ fn covers(rel: vec2f) -> bool {
         return frame.water.z > 0.0;
     }
     return textureLoad(basin_map, vec2i(round(place)), 0).x > 0.0;
+}
+
+// Distance (m) to the shore of the lake at a place, negative where there is none. Its edge is the contour of the ground a few centimetres above its level.
+fn lake_at(rel: vec2f) -> f32 {
+    let p = frame.basin.xy + rel * frame.basin.zw;
+    if frame.basin_size.z == 0.0 || any(p < vec2f(0.0)) || any(p > frame.basin_size.xy - 1.0) {
+        return -1.0;
+    }
+    let ij = min(vec2i(p), vec2i(frame.basin_size.xy) - 2);
+    let f = p - vec2f(ij);
+    let a = textureLoad(basin_map, ij, 0).y;
+    let b = textureLoad(basin_map, ij + vec2i(1, 0), 0).y;
+    let c = textureLoad(basin_map, ij + vec2i(0, 1), 0).y;
+    let d = textureLoad(basin_map, ij + 1, 0).y;
+    if a + b + c + d == 0.0 {
+        return -1.0;
+    }
+    var wet = vec2f(1.0, 1.0);
+    if a > 0.0 {
+        wet = vec2f(0.0);
+    } else if b > 0.0 {
+        wet = vec2f(1.0, 0.0);
+    } else if c > 0.0 {
+        wet = vec2f(0.0, 1.0);
+    }
+    let level = mean_of(sample_of(rel + (wet - f) / frame.basin.zw), 0u);
+    if mean_of(sample_of(rel), 0u) > level + 0.05 {
+        return -1.0;
+    }
+    return mix(mix(a, b, f.x), mix(c, d, f.x), f.y) * 255.0 / max(frame.basin.z, frame.basin.w);
 }
 
 // Depth (m) and share of water beyond the border, by how far away that is.
@@ -165,18 +195,18 @@ fn glitter(eye: vec3f, sun: vec3f, r: Ripples) -> f32 {
 
 // The ripples of a light air.
 fn ripples_at(rel: vec2f, footprint: f32) -> Ripples {
-    let lanes = patch_of(42u, rel, 0.0, 700.0, footprint, 40u)
-        + 0.7 * patch_of(43u, rel, 0.0, 190.0, footprint, 41u)
-        + 0.4 * patch_of(44u, rel, 0.0, 47.0, footprint, 44u);
+    var lanes = 0.0;
+    for (var k = 0u; k < 3u; k++) {
+        lanes += patch_of(42u + k, rel, 0.0, footprint) * (1.0 - 0.3 * f32(k));
+    }
     let strength = clamp(0.85 + 1.1 * lanes, 0.25, 1.8);
     var slope = vec2f(0.0);
     var variance = 4.0e-4;
-    var wavelength = 17.0;
     for (var octave = 0u; octave < 9u; octave++) {
         let amplitude = 0.020 * strength * select(1.0, 0.45, octave < 2u);
-        let share = resolved(wavelength, footprint);
+        let share = resolved(frame.noise[33u + octave].wavelength, footprint);
         if share > 0.0 {
-            let g = grain(33u + octave, rel, 0.37, 50u + octave).gradient;
+            let g = grain(33u + octave, rel, 0.37).gradient;
             let turn = 0.35 + 0.9 * f32(octave);
             let s = sin(turn);
             let c = cos(turn);
@@ -184,7 +214,6 @@ fn ripples_at(rel: vec2f, footprint: f32) -> Ripples {
             slope += vec2f(d.x * c - d.y * s, d.x * s + d.y * c) * (amplitude * share);
         }
         variance += 0.45 * amplitude * amplitude * (1.0 - share * share);
-        wavelength *= 0.53;
     }
     return Ripples(slope, vec3f(variance, 0.0, variance));
 }

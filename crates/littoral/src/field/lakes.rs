@@ -143,6 +143,11 @@ impl Lakes {
         &self.levels
     }
 
+    /// For each sample of the land, counted row by row from the south: 0 where there is no lake, else the distance to its shore in samples, at most 255.
+    pub fn shores(&self) -> &[u8] {
+        &self.shore
+    }
+
     /// Share of the land's samples that they cover, in [0, 1].
     pub fn share(&self) -> f64 {
         self.shore.iter().filter(|d| **d > 0).count() as f64 / self.shore.len() as f64

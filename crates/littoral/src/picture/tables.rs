@@ -48,6 +48,8 @@ pub struct Tables {
     pub horizon: Vec<f32>,
     /// Where ground below the level of the water (m) is wet: at points whose value is not 0.
     pub water: Option<(f64, Lattice<u8>)>,
+    /// At the same points as the water, distance to the shore of the lake there, in samples: 0 where there is none; empty where there are no lakes.
+    pub lakes: Lattice<u8>,
     /// Whether that water goes on to the horizon.
     pub endless: bool,
     /// Beyond the land, depth (m) and share of water: for places along the border, counter-clockwise from its south-western corner (columns, evenly), and
@@ -147,21 +149,17 @@ impl Stage<'_> {
                 values: values.collect(),
             }
         });
+        let on_land = |values: &[u8]| {
+            let raster = scene.land.raster();
+            let (columns, rows, spacing) = (raster.columns(), raster.rows(), raster.spacing());
+            Lattice { columns, rows, origin: land.0, spacing, values: values.to_vec() }
+        };
         Some(Tables {
             horizon,
             known: self.ground.known_samples().to_vec(),
             standing: self.ground.standing_samples().to_vec(),
-            water: scene.water.map(|water| {
-                let raster = scene.land.raster();
-                let lattice = Lattice {
-                    columns: raster.columns(),
-                    rows: raster.rows(),
-                    origin: land.0,
-                    spacing: raster.spacing(),
-                    values: water.basin().to_vec(),
-                };
-                (water.level, lattice)
-            }),
+            water: scene.water.map(|water| (water.level, on_land(water.basin()))),
+            lakes: scene.lakes.map_or(Lattice::default(), |lakes| on_land(lakes.shores())),
             endless: scene.water.is_some_and(|water| water.reaches_horizon()),
             rim,
             land,
