@@ -13,6 +13,10 @@ struct Noise {
     matrix: [f32; 4],
     cell: [i32; 2],
     rest: [f32; 2],
+    wavelength: f32,
+    upward: f32,
+    seed: u32,
+    unused: u32,
 }
 
 /// Room for noises.
@@ -57,31 +61,81 @@ pub struct Look {
     pub number: u32,
 }
 
-/// From metres to the coordinates of each noise, where samples are so far apart (m): see `natural.wgsl` and `water.wgsl` for which number is which.
-fn noises(spacing: f64) -> Vec<DMat2> {
-    let even = |wavelength: f64| DMat2::from_diagonal(DVec2::splat(1.0 / wavelength));
-    let mut all: Vec<DMat2> =
-        (0..11).map(|octave| even(f64::from(relief_wavelength(spacing as f32, octave)))).collect();
-    all.extend([620.0, 260.0, 2700.0, 9400.0, 74.0, 31.0, 9.0, 3.1, 0.9, 14.0, 7.0, 2.3].map(even));
-    let tall = (spacing / 4.0).max(1.0);
-    all.extend([13.0, 4.1, 1.3].map(|wavelength| even(wavelength * tall / 0.05)));
-    all.extend([8.5 * tall, 1.7, 0.6, 21.0, 46.0, 17.0, 2.0].map(even));
-    let mut wavelength = 17.0f32;
-    for octave in 0..9 {
-        // Each octave of ripples turned a little, and longer along its crests.
-        let (s, c) = (0.35 + 0.9 * f64::from(octave)).sin_cos();
-        let turned = DMat2::from_cols(DVec2::new(c, -0.55 * s), DVec2::new(s, 0.55 * c));
-        all.push(turned * (1.0 / f64::from(wavelength)));
-        wavelength *= 0.53;
-    }
-    let lanes = DMat2::from_cols(DVec2::new(0.8, -0.6 * 2.6), DVec2::new(0.6, 0.8 * 2.6));
-    all.extend([700.0, 190.0, 47.0].map(|wavelength| lanes * (1.0 / wavelength)));
-    all
+/// A noise of the engine's `picture`: `natural`, or `sea`.
+struct Sound {
+    /// From metres, east and north, to its own coordinates.
+    matrix: DMat2,
+    /// Its third coordinates a metre of height.
+    upward: f64,
+    /// Its wavelength (m), by which it fades out.
+    wavelength: f32,
+    seed: u32,
 }
 
-/// Wavelength (m) of an octave of the relief below the samples.
-fn relief_wavelength(spacing: f32, octave: u32) -> f32 {
-    (0..octave).fold(2.3 * spacing, |wavelength, _| wavelength * 0.47)
+/// All noises where samples are so far apart (m), by the numbers that `natural.wgsl` and `water.wgsl` know them by.
+fn noises(spacing: f64) -> Vec<Sound> {
+    let even = |wavelength: f64, tall: f64, seed: u32| Sound {
+        matrix: DMat2::from_diagonal(DVec2::splat(1.0 / wavelength)),
+        upward: tall / wavelength,
+        wavelength: wavelength as f32,
+        seed,
+    };
+    let mut all = Vec::new();
+    // 0: octaves of relief below the samples.
+    let mut wavelength = 2.3 * spacing as f32;
+    for octave in 0..11 {
+        all.push(even(f64::from(wavelength), 1.0, 100 + octave));
+        wavelength *= 0.47;
+    }
+    // 11: patches of growth.
+    let patches = [
+        (620.0, 1),
+        (260.0, 2),
+        (2700.0, 15),
+        (9400.0, 16),
+        (74.0, 3),
+        (31.0, 4),
+        (9.0, 5),
+        (3.1, 6),
+        (0.9, 7),
+        (14.0, 12),
+    ];
+    all.extend(patches.map(|(wavelength, seed)| even(wavelength, 0.35, seed)));
+    // 21: crowns and twigs.
+    all.extend([even(7.0, 1.0, 8), even(2.3, 1.0, 9)]);
+    // 23: beds of stone, wide and thin; 26: joints.
+    let tall = (spacing / 4.0).max(1.0);
+    let bed = |wavelength: f64, seed| Sound {
+        matrix: DMat2::from_diagonal(DVec2::splat(0.05 / (wavelength * tall))),
+        ..even(wavelength, 1.0, seed)
+    };
+    all.extend([bed(13.0, 10), bed(4.1, 11), bed(1.3, 13), even(8.5 * tall, 0.16, 14)]);
+    // 27: leaves, twigs, kinds of trees, kinds of houses (two), tiles.
+    all.extend([
+        even(1.7, 1.0, 20),
+        even(0.6, 1.0, 21),
+        even(21.0, 0.0, 22),
+        even(46.0, 0.0, 23),
+        even(17.0, 0.0, 24),
+        even(2.0, 1.0, 25),
+    ]);
+    // 33: octaves of ripples, each turned a little, and longer along its crests.
+    let mut wavelength = 17.0f32;
+    for octave in 0..9 {
+        let (s, c) = (0.35 + 0.9 * f64::from(octave)).sin_cos();
+        let turned = DMat2::from_cols(DVec2::new(c, -0.55 * s), DVec2::new(s, 0.55 * c));
+        all.push(Sound { matrix: turned * (1.0 / f64::from(wavelength)), upward: 1.0, wavelength, seed: 50 + octave });
+        wavelength *= 0.53;
+    }
+    // 42: lanes of wind.
+    let lanes = DMat2::from_cols(DVec2::new(0.8, -0.6 * 2.6), DVec2::new(0.6, 0.8 * 2.6));
+    all.extend([(700.0f32, 40), (190.0, 41), (47.0, 44)].map(|(wavelength, seed)| Sound {
+        matrix: lanes * (1.0 / f64::from(wavelength)),
+        upward: 0.0,
+        wavelength,
+        seed,
+    }));
+    all
 }
 
 impl Uniforms {
@@ -110,14 +164,18 @@ impl Uniforms {
         let pair = |a: DVec2, b: DVec2| [a.x as f32, a.y as f32, b.x as f32, b.y as f32];
         let place = |origin: DVec2, spacing: DVec2| pair((flat - origin) / spacing, 1.0 / spacing);
         let mut noise = [Noise::zeroed(); NOISES];
-        for (noise, matrix) in noise.iter_mut().zip(noises(f64::from(scenery.mean_spacing))) {
-            let at = matrix * flat;
+        for (noise, sound) in noise.iter_mut().zip(noises(f64::from(scenery.mean_spacing))) {
+            let at = sound.matrix * flat;
             let cell = at.floor();
-            let rows = matrix.transpose();
+            let rows = sound.matrix.transpose();
             *noise = Noise {
                 matrix: [rows.x_axis.x, rows.x_axis.y, rows.y_axis.x, rows.y_axis.y].map(|v| v as f32),
                 cell: [cell.x as i64 as i32, cell.y as i64 as i32],
                 rest: (at - cell).as_vec2().to_array(),
+                wavelength: sound.wavelength,
+                upward: sound.upward as f32,
+                seed: sound.seed,
+                unused: 0,
             };
         }
         let level = scenery.level.map_or(0.0, |level| (level - eye.z) as f32);

@@ -5,15 +5,19 @@
 //!
 //! A picture takes two steps: first only how far away surfaces are, as triangles; then every pixel is lit once, from the data and not from the triangles.
 //! So light costs the same whatever the method, and pictures of two methods differ by their triangles alone.
+//!
+//! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
 mod device;
 mod frame;
 mod painter;
 mod renderer;
 mod scenery;
+pub mod sea;
 
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};
 pub use renderer::{Renderer, SHADERS, Triangles};
 pub use scenery::{Scenery, TooLarge};
+pub use sea::GpuSea;

@@ -6,6 +6,11 @@ struct Noise {
     // Those of the eye: lattice point, and what is left.
     cell: vec2i,
     rest: vec2f,
+    // Wavelength (m); its third coordinates a metre of height; seed.
+    wavelength: f32,
+    upward: f32,
+    seed: u32,
+    unused: u32,
 }
 
 struct Frame {

@@ -1,4 +1,4 @@
-// Natural ground: the engine's `picture::natural`, line by line. Noise is told apart by its number in the frame (see `noise.rs`).
+// Natural ground: the engine's `picture::natural`, line by line. Noise is told apart by its number in the frame (see `noises` in frame.rs).
 
 struct Material {
     albedo: vec3f,
@@ -49,39 +49,36 @@ fn natural(site: Site, surface: Surface, broad: Surface) -> Material {
     let shore_calm = step_between(0.5, 6.0, abs(above) + 12.0 * rocky);
     let amplitude = (0.060 + 0.24 * rocky - 0.07 * step_between(1.4, 2.4, steep)) * (0.25 + 0.75 * shore_calm);
     let layers = 0.35 + 1.7 * step_between(0.9, 1.8, steep);
-    var wavelength = 2.3 * spacing;
     var relief = vec3f(0.0);
     var bumps = 0.0;
     var shown = 0.0;
     for (var octave = 0u; octave < 11u; octave++) {
-        let share = resolved(wavelength, footprint);
+        let share = resolved(frame.noise[octave].wavelength, footprint);
         if share == 0.0 {
             break;
         }
-        let n = grain(octave, rel, z * layers / wavelength, 100u + octave);
+        let n = grain(octave, rel, z * layers);
         relief += n.gradient * vec3f(1.0, 1.0, layers) * (amplitude * share);
         bumps += n.value * share;
         shown += 1.0;
-        wavelength *= 0.47;
     }
     let roughened = normalize(normal - (relief - normal * dot(relief, normal)));
     let rough_steep = sqrt(max(1.0 - roughened.z * roughened.z, 0.0)) / max(roughened.z, 0.05);
     let pits = clamp(bumps / sqrt(max(shown, 1.0)), -1.0, 1.0);
 
-    // Patches of growth.
-    let low = 0.35 * z;
-    var wide = patch_of(11u, rel, low / 620.0, 620.0, footprint, 1u) + 0.6 * patch_of(12u, rel, low / 260.0, 260.0, footprint, 2u);
+    // Patches of growth, by wavelength.
     let regional = step_between(12.0, 40.0, spacing);
-    if regional > 0.0 {
-        wide = wide * (1.0 - 0.45 * regional)
-            + regional * 0.75 * (patch_of(13u, rel, low / 2700.0, 2700.0, footprint, 15u) + patch_of(14u, rel, low / 9400.0, 9400.0, footprint, 16u));
+    var p: array<f32, 10>;
+    for (var k = 0u; k < 10u; k++) {
+        if regional > 0.0 || (k != 2u && k != 3u) {
+            p[k] = patch_of(11u + k, rel, z, footprint);
+        }
     }
-    let thirty = patch_of(16u, rel, low / 31.0, 31.0, footprint, 4u);
-    let fourteen = patch_of(20u, rel, low / 14.0, 14.0, footprint, 12u);
-    let middle = patch_of(15u, rel, low / 74.0, 74.0, footprint, 3u) + 0.6 * thirty;
-    let fine = patch_of(17u, rel, low / 9.0, 9.0, footprint, 5u)
-        + 0.7 * patch_of(18u, rel, low / 3.1, 3.1, footprint, 6u)
-        + 0.5 * patch_of(19u, rel, low / 0.9, 0.9, footprint, 7u);
+    let thirty = p[5];
+    let fourteen = p[9];
+    let wide = (p[0] + 0.6 * p[1]) * (1.0 - 0.45 * regional) + regional * 0.75 * (p[2] + p[3]);
+    let middle = p[4] + 0.6 * thirty;
+    let fine = p[6] + 0.7 * p[7] + 0.5 * p[8];
     let moist = clamp(broad.hollow * max(spacing, 8.0) * 9.0, -1.0, 1.0);
     let tree_line = frame.climate.x;
     let snow_line = frame.climate.y;
@@ -103,9 +100,9 @@ fn natural(site: Site, surface: Surface, broad: Surface) -> Material {
         let crown = resolved(7.0, footprint);
         var crowns = Grain(0.0, vec3f(0.0));
         if crown > 0.0 {
-            crowns = grain(21u, rel, z / 7.0, 8u);
+            crowns = grain(21u, rel, z);
         }
-        let twigs = patch_of(22u, rel, z / 2.3, 2.3, footprint, 9u);
+        let twigs = patch_of(22u, rel, z, footprint);
         let canopy = normalize(normal - crowns.gradient * (0.55 * crown) * vec3f(1.0, 1.0, 0.3));
         let tone = 1.0 + 0.45 * crown * crowns.value + 0.35 * twigs + 0.25 * fine;
         albedo = mix(albedo, WOODS * tone * (1.0 + 0.3 * wide), wood * 0.94);
@@ -127,14 +124,15 @@ fn natural(site: Site, surface: Surface, broad: Surface) -> Material {
         let cliff = step_between(0.9, 1.7, steep * (1.0 + 0.5 * blunt));
         let tall = max(spacing / 4.0, 1.0);
         let bed_z = (z + frame.climate.w + 0.06 * rel.x + 0.03 * rel.y) / tall;
-        let bed = patch_of(23u, rel, bed_z / 13.0, 13.0, footprint / tall, 10u)
-            + 0.6 * patch_of(24u, rel, bed_z / 4.1, 4.1, footprint / tall, 11u)
-            + 0.35 * patch_of(25u, rel, bed_z / 1.3, 1.3, footprint / tall, 13u);
+        var bed = 0.0;
+        for (var k = 0u; k < 3u; k++) {
+            bed += patch_of(23u + k, rel, bed_z, footprint / tall) * select(select(0.35, 0.6, k == 1u), 1.0, k == 0u);
+        }
         // Joints as wide as a valley would look like worms.
         let split = resolved(8.5 * tall, footprint) * cliff * (1.0 - step_between(6.0, 16.0, spacing));
         var joints = Grain(1.0, vec3f(0.0));
         if split > 0.0 {
-            joints = grain(26u, rel, 0.16 * z / (8.5 * tall), 14u);
+            joints = grain(26u, rel, z);
         }
         let crack = split * step_between(0.16, 0.0, abs(joints.value));
         let lean = joints.gradient * vec3f(0.42, 0.42, 0.07) * split;
@@ -188,14 +186,23 @@ fn stands(site: Site, surface: Surface, ground: vec3f, normal: vec3f) -> Materia
     let steep = length(surface.slope);
     let rough = step_between(0.10, 0.32, abs(surface.hollow) * frame.eye.w + 0.10 * max(steep - 1.0, 0.0))
         * (1.0 - step_between(24.0, 34.0, site.standing));
-    let leaves = grain(27u, rel, z / 1.7, 20u);
-    let twigs = grain(28u, rel, z / 0.6, 21u);
+    var both: array<Grain, 2>;
+    for (var k = 0u; k < 2u; k++) {
+        both[k] = grain(27u + k, rel, z);
+    }
+    let leaves = both[0];
+    let twigs = both[1];
+    // Kinds of trees; kinds of houses, whatever the footprint; tiles.
+    var p: array<f32, 4>;
+    for (var k = 0u; k < 4u; k++) {
+        p[k] = patch_of(29u + k, rel, z, select(footprint, 0.1, k == 1u || k == 2u));
+    }
     let near = resolved(1.7, footprint);
     let nearer = resolved(0.6, footprint);
     let shaken = leaves.gradient * (0.6 * near) + twigs.gradient * (0.4 * nearer);
-    let tree = WOODS * (1.5 + 0.9 * patch_of(29u, rel, 0.0, 21.0, footprint, 22u) + 0.5 * near * leaves.value + 0.5 * nearer * twigs.value);
-    let kind = patch_of(30u, rel, 0.0, 46.0, 0.1, 23u) + 0.5 * patch_of(31u, rel, 0.0, 17.0, 0.1, 24u);
-    let roof = mix(ROOF_TILES, ROOF_SLATE, step_between(-0.02, 0.06, kind)) * (1.0 + 0.15 * patch_of(32u, rel, z / 2.0, 2.0, footprint, 25u));
+    let tree = WOODS * (1.5 + 0.9 * p[0] + 0.5 * near * leaves.value + 0.5 * nearer * twigs.value);
+    let kind = p[1] + 0.5 * p[2];
+    let roof = mix(ROOF_TILES, ROOF_SLATE, step_between(-0.02, 0.06, kind)) * (1.0 + 0.15 * p[3]);
     let house = mix(roof, PLASTER, step_between(1.3, 2.4, steep));
     let share = step_between(1.0, 2.2, site.standing);
     let leafy = normalize(normal - shaken * rough);

@@ -31,25 +31,27 @@ struct Grain {
     gradient: vec3f,
 }
 
-// Where a place is in the lattice of noise number `id`: `rel` metres from the eye east and north, `z` in its own third coordinate.
+// Where a place is in the lattice of a noise.
 struct Cell {
     base: vec3u,
     f: vec3f,
+    seed: u32,
 }
 
+// `rel` metres from the eye east and north, `z` metres up.
 fn cell_of(id: u32, rel: vec2f, z: f32) -> Cell {
     let n = frame.noise[id];
-    let p = vec3f(n.rest + vec2f(dot(n.matrix.xy, rel), dot(n.matrix.zw, rel)), z);
+    let p = vec3f(n.rest + vec2f(dot(n.matrix.xy, rel), dot(n.matrix.zw, rel)), z * n.upward);
     let whole = floor(p);
-    return Cell(bitcast<vec3u>(vec3i(whole) + vec3i(n.cell, 0)), p - whole);
+    return Cell(bitcast<vec3u>(vec3i(whole) + vec3i(n.cell, 0)), p - whole, n.seed);
 }
 
-fn corner_gradient(cell: Cell, seed: u32, corner: vec3u) -> vec3f {
-    return gradient_of(hash(cell.base + corner, seed));
+fn corner_gradient(cell: Cell, corner: vec3u) -> vec3f {
+    return gradient_of(hash(cell.base + corner, cell.seed));
 }
 
-fn corner_value(cell: Cell, seed: u32, corner: vec3u) -> f32 {
-    return dot(corner_gradient(cell, seed, corner), cell.f - vec3f(corner));
+fn corner_value(cell: Cell, corner: vec3u) -> f32 {
+    return dot(corner_gradient(cell, corner), cell.f - vec3f(corner));
 }
 
 fn fade(f: vec3f) -> vec3f {
@@ -57,17 +59,17 @@ fn fade(f: vec3f) -> vec3f {
 }
 
 // The noise and its gradient, per unit of its own coordinates.
-fn grain(id: u32, rel: vec2f, z: f32, seed: u32) -> Grain {
+fn grain(id: u32, rel: vec2f, z: f32) -> Grain {
     let cell = cell_of(id, rel, z);
     let f = cell.f;
-    let g0 = corner_gradient(cell, seed, vec3u(0u, 0u, 0u));
-    let g1 = corner_gradient(cell, seed, vec3u(1u, 0u, 0u));
-    let g2 = corner_gradient(cell, seed, vec3u(0u, 1u, 0u));
-    let g3 = corner_gradient(cell, seed, vec3u(1u, 1u, 0u));
-    let g4 = corner_gradient(cell, seed, vec3u(0u, 0u, 1u));
-    let g5 = corner_gradient(cell, seed, vec3u(1u, 0u, 1u));
-    let g6 = corner_gradient(cell, seed, vec3u(0u, 1u, 1u));
-    let g7 = corner_gradient(cell, seed, vec3u(1u, 1u, 1u));
+    let g0 = corner_gradient(cell, vec3u(0u, 0u, 0u));
+    let g1 = corner_gradient(cell, vec3u(1u, 0u, 0u));
+    let g2 = corner_gradient(cell, vec3u(0u, 1u, 0u));
+    let g3 = corner_gradient(cell, vec3u(1u, 1u, 0u));
+    let g4 = corner_gradient(cell, vec3u(0u, 0u, 1u));
+    let g5 = corner_gradient(cell, vec3u(1u, 0u, 1u));
+    let g6 = corner_gradient(cell, vec3u(0u, 1u, 1u));
+    let g7 = corner_gradient(cell, vec3u(1u, 1u, 1u));
     let d0 = dot(g0, f);
     let d1 = dot(g1, f - vec3f(1.0, 0.0, 0.0));
     let d2 = dot(g2, f - vec3f(0.0, 1.0, 0.0));
@@ -88,14 +90,14 @@ fn grain(id: u32, rel: vec2f, z: f32, seed: u32) -> Grain {
 }
 
 // Its value alone.
-fn value_of(id: u32, rel: vec2f, z: f32, seed: u32) -> f32 {
+fn value_of(id: u32, rel: vec2f, z: f32) -> f32 {
     let cell = cell_of(id, rel, z);
     let u = fade(cell.f);
     let x = vec4f(
-        mix(corner_value(cell, seed, vec3u(0u, 0u, 0u)), corner_value(cell, seed, vec3u(1u, 0u, 0u)), u.x),
-        mix(corner_value(cell, seed, vec3u(0u, 1u, 0u)), corner_value(cell, seed, vec3u(1u, 1u, 0u)), u.x),
-        mix(corner_value(cell, seed, vec3u(0u, 0u, 1u)), corner_value(cell, seed, vec3u(1u, 0u, 1u)), u.x),
-        mix(corner_value(cell, seed, vec3u(0u, 1u, 1u)), corner_value(cell, seed, vec3u(1u, 1u, 1u)), u.x),
+        mix(corner_value(cell, vec3u(0u, 0u, 0u)), corner_value(cell, vec3u(1u, 0u, 0u)), u.x),
+        mix(corner_value(cell, vec3u(0u, 1u, 0u)), corner_value(cell, vec3u(1u, 1u, 0u)), u.x),
+        mix(corner_value(cell, vec3u(0u, 0u, 1u)), corner_value(cell, vec3u(1u, 0u, 1u)), u.x),
+        mix(corner_value(cell, vec3u(0u, 1u, 1u)), corner_value(cell, vec3u(1u, 1u, 1u)), u.x),
     );
     return mix(mix(x.x, x.y, u.y), mix(x.z, x.w, u.y), u.z);
 }
@@ -106,11 +108,11 @@ fn resolved(wavelength: f32, footprint: f32) -> f32 {
     return t * t * (3.0 - 2.0 * t);
 }
 
-// The value of noise of a wavelength (m), fading out where it is finer than `footprint` (m).
-fn patch_of(id: u32, rel: vec2f, z: f32, wavelength: f32, footprint: f32, seed: u32) -> f32 {
-    let share = resolved(wavelength, footprint);
+// The value of noise number `id`, fading out where it is finer than `footprint` (m).
+fn patch_of(id: u32, rel: vec2f, z: f32, footprint: f32) -> f32 {
+    let share = resolved(frame.noise[id].wavelength, footprint);
     if share == 0.0 {
         return 0.0;
     }
-    return value_of(id, rel, z, seed) * share;
+    return value_of(id, rel, z) * share;
 }

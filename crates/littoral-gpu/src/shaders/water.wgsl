@@ -195,18 +195,18 @@ fn glitter(eye: vec3f, sun: vec3f, r: Ripples) -> f32 {
 
 // The ripples of a light air.
 fn ripples_at(rel: vec2f, footprint: f32) -> Ripples {
-    let lanes = patch_of(42u, rel, 0.0, 700.0, footprint, 40u)
-        + 0.7 * patch_of(43u, rel, 0.0, 190.0, footprint, 41u)
-        + 0.4 * patch_of(44u, rel, 0.0, 47.0, footprint, 44u);
+    var lanes = 0.0;
+    for (var k = 0u; k < 3u; k++) {
+        lanes += patch_of(42u + k, rel, 0.0, footprint) * (1.0 - 0.3 * f32(k));
+    }
     let strength = clamp(0.85 + 1.1 * lanes, 0.25, 1.8);
     var slope = vec2f(0.0);
     var variance = 4.0e-4;
-    var wavelength = 17.0;
     for (var octave = 0u; octave < 9u; octave++) {
         let amplitude = 0.020 * strength * select(1.0, 0.45, octave < 2u);
-        let share = resolved(wavelength, footprint);
+        let share = resolved(frame.noise[33u + octave].wavelength, footprint);
         if share > 0.0 {
-            let g = grain(33u + octave, rel, 0.37, 50u + octave).gradient;
+            let g = grain(33u + octave, rel, 0.37).gradient;
             let turn = 0.35 + 0.9 * f32(octave);
             let s = sin(turn);
             let c = cos(turn);
@@ -214,7 +214,6 @@ fn ripples_at(rel: vec2f, footprint: f32) -> Ripples {
             slope += vec2f(d.x * c - d.y * s, d.x * s + d.y * c) * (amplitude * share);
         }
         variance += 0.45 * amplitude * amplitude * (1.0 - share * share);
-        wavelength *= 0.53;
     }
     return Ripples(slope, vec3f(variance, 0.0, variance));
 }

@@ -27,11 +27,13 @@ mod foam;
 mod patch;
 mod plan;
 mod query;
+mod spectrum;
 #[cfg(test)]
 mod tests;
 mod velocity;
 
 pub use plan::Tile;
+pub use spectrum::{Breakers, FoamInstant, FoamTick, Samples, Spectrum, Wave};
 
 use super::fft::steps::Run;
 use super::model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
@@ -136,7 +138,7 @@ impl Cascades {
         let mut patches: Vec<Patch> = tiles.par_iter().enumerate().map(patch).collect();
         let sharing = patches.iter().filter(|patch| patch.foam.is_some()).count();
         for (index, foam) in patches.iter_mut().filter_map(|patch| patch.foam.as_mut()).enumerate() {
-            foam.share = match (index, sharing) {
+            foam.breaking.share = match (index, sharing) {
                 (0, 1) => 1.0,
                 (0, _) => foam::FIRST_SHARE,
                 _ => (1.0 - foam::FIRST_SHARE) / (sharing - 1) as f64,

@@ -6,6 +6,7 @@ const TICK: f64 = 0.25;
 const END: f64 = 1e9;
 
 /// How time goes on.
+#[derive(Clone, Debug)]
 pub(super) struct Clock {
     /// When the sea has each of its states (s), rising.
     pub times: Vec<f64>,

@@ -40,6 +40,12 @@ pub(super) struct Foam {
     samples: usize,
     /// The tick that `before` stands at.
     tick: Option<i64>,
+    pub breaking: Breaking,
+}
+
+/// When a tile's waves break.
+#[derive(Clone, Debug)]
+pub(super) struct Breaking {
     /// Variance of the stretch, by state.
     stretches: Vec<f64>,
     /// Its part of the whole cover.
@@ -65,6 +71,21 @@ pub(super) fn torn(foam: f32, pressed: f32) -> f32 {
     (foam + 1.5 * foam * (1.0 - foam) * pressed.clamp(-2.0, 2.0)).clamp(0.0, 1.0)
 }
 
+/// What is left of foam after a tick.
+pub(super) fn decay(instant: &Instant) -> f32 {
+    exp(-instant.length / FADING) as f32
+}
+
+/// After how many ticks nothing is left of what was.
+pub(super) fn memory(decay: f32) -> i64 {
+    let (mut memory, mut left) = (1, 1.0);
+    while left >= LEAST_FOAM {
+        left *= decay;
+        memory += 1;
+    }
+    memory
+}
+
 impl Foam {
     /// For a tile whose stretches have variances by state; `None` where its waves are too short to make any, or too long.
     pub fn new(tile: &Tile, stretches: &[f64], states: &[SeaState]) -> Option<Foam> {
@@ -78,20 +99,15 @@ impl Foam {
             coarser: Lazy::new(),
             samples: tile.samples,
             tick: None,
-            stretches: stretches.to_vec(),
-            share: 1.0,
+            breaking: Breaking { stretches: stretches.to_vec(), share: 1.0 },
         })
     }
 
     /// Goes to an instant. `advance` makes the foam after a tick of that before.
     pub fn set(&mut self, instant: &Instant, mut advance: impl FnMut(Moment, Foaming, &[Lane], &mut [Lane])) {
         self.coarser.forget();
-        let decay = exp(-instant.length / FADING) as f32;
-        let (mut memory, mut left) = (1, 1.0);
-        while left >= LEAST_FOAM {
-            left *= decay;
-            memory += 1;
-        }
+        let decay = decay(instant);
+        let memory = memory(decay);
         // `before` is to come to the instant's tick and `after` to the next.
         let behind = self.tick.map(|tick| match instant.ticks {
             Some(ticks) => (instant.tick - tick).rem_euclid(ticks),
@@ -107,7 +123,7 @@ impl Foam {
         for tick in instant.tick + 2 - missing..=instant.tick + 1 {
             std::mem::swap(&mut self.before, &mut self.after);
             let moment = instant.at_tick(tick);
-            let foaming = self.foaming(&moment, decay);
+            let foaming = self.breaking.foaming(&moment, decay);
             advance(moment, foaming, &self.before, &mut self.after);
         }
         self.tick = Some(instant.tick);
@@ -119,23 +135,21 @@ impl Foam {
         }
     }
 
-    fn foaming(&self, moment: &Moment, decay: f32) -> Foaming {
-        let (state, share) = moment.blend;
-        let next = self.stretches[(state + 1).min(self.stretches.len() - 1)];
-        let deviation = sqrt(self.stretches[state] + (next - self.stretches[state]) * share);
-        // Tiles with foam overlap by chance, and so do whitecaps of different times.
-        let cover = cover(moment.wind).max(1e-6);
-        let chance = -log1p(-cover) * self.share / PERSISTENCE;
-        if cover <= 1e-6 || deviation < 1e-4 {
-            return Foaming { decay, threshold: -1e3, steepness: 1.0 };
-        }
-        let threshold = 1.0 - deviation * deviations(chance);
-        Foaming { decay, threshold: threshold as f32, steepness: (1.0 / (FULL * deviation)) as f32 }
-    }
-
     /// Where a sample stands.
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.shown[(y / LANES) * self.samples + x][y % LANES]
+    }
+
+    /// The mean over 2^`level` samples along each side; over all of them from the last level on.
+    pub fn mean(&self, level: usize, x: usize, y: usize) -> f32 {
+        let level = level.min(self.levels());
+        let size = self.samples >> level;
+        let (x, y) = (x % size, y % size);
+        if level == 0 {
+            return self.at(x, y);
+        }
+        // n²/4 (1 + 1/4 + …) numbers come before a level.
+        self.means()[(self.samples * self.samples - 4 * size * size) / 3 + y * size + x]
     }
 
     /// Number of coarser levels.
@@ -169,6 +183,22 @@ impl Foam {
 
     pub fn bytes(&self) -> usize {
         3 * size_of_val(&self.shown[..])
+    }
+}
+
+impl Breaking {
+    pub fn foaming(&self, moment: &Moment, decay: f32) -> Foaming {
+        let (state, share) = moment.blend;
+        let next = self.stretches[(state + 1).min(self.stretches.len() - 1)];
+        let deviation = sqrt(self.stretches[state] + (next - self.stretches[state]) * share);
+        // Tiles with foam overlap by chance, and so do whitecaps of different times.
+        let cover = cover(moment.wind).max(1e-6);
+        let chance = -log1p(-cover) * self.share / PERSISTENCE;
+        if cover <= 1e-6 || deviation < 1e-4 {
+            return Foaming { decay, threshold: -1e3, steepness: 1.0 };
+        }
+        let threshold = 1.0 - deviation * deviations(chance);
+        Foaming { decay, threshold: threshold as f32, steepness: (1.0 / (FULL * deviation)) as f32 }
     }
 }
 
