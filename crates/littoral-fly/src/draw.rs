@@ -83,7 +83,10 @@ impl Renderer {
             return self.plain.draw(gpu, &scenery.plain, &drawn, target);
         };
         if self.holds != Some(frame.number) {
-            self.ground.set(gpu, &frame.ground);
+            // No budget of the panel's is too large for what WebGPU promises of buffers; if one were, the triangles before stay.
+            if let Err(problem) = self.ground.set(gpu, &frame.ground) {
+                eprintln!("littoral-fly: {problem}");
+            }
             self.holds = Some(frame.number);
         }
         // Edges are drawn by the pixels of the target.

@@ -87,6 +87,7 @@ impl Paint {
     /// Paints the window.
     pub fn show(&mut self, cockpit: &Cockpit, gui: &Gui) -> Result<(), Missed> {
         use wgpu::CurrentSurfaceTexture as Current;
+        self.gpu.check().map_err(|e| Missed::Lost(e.to_string()))?;
         let texture = match self.surface.get_current_texture() {
             Current::Success(texture) | Current::Suboptimal(texture) => texture,
             Current::Timeout | Current::Occluded => return Err(Missed::Frame),

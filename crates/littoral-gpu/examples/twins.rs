@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let Datum::Plane { origin, size: extent } = field.datum() else { return Err("expected a plane".into()) };
     let scenery = Scenery::new(&gpu, &tables, (origin, extent), (view.eye.z, &stage.sky_table(view.eye.z)))?;
     let mut ground = Triangles::default();
-    ground.set(&gpu, &drawing.mesh);
+    ground.set(&gpu, &drawing.mesh)?;
     let mut renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
     let looks = 16;
     let mut sum = vec![[0.0f32; 4]; (size.x * size.y) as usize];

@@ -1,6 +1,7 @@
 //! A device for those who have none.
 
 use std::fmt::Write;
+use std::sync::{Arc, OnceLock};
 
 /// A device and its queue.
 #[derive(Clone, Debug)]
@@ -11,6 +12,8 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// What does the work.
     pub adapter: wgpu::AdapterInfo,
+    /// What went wrong first.
+    fault: Arc<OnceLock<String>>,
 }
 
 /// Why there is no device.
@@ -92,7 +95,27 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| GpuError::NoDevice { adapter: info.name.clone(), reason: one_line(&e) })?;
-        Ok(Gpu { device, queue, adapter: info })
+        // Without memory, or without a device, what is drawn is drawn nowhere: the one who waits for it is told.
+        let fault = Arc::new(OnceLock::new());
+        let (first, lost) = (fault.clone(), fault.clone());
+        device.on_uncaptured_error(Arc::new(move |error| drop(first.set(one_line(&error)))));
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                drop(lost.set(format!("device lost ({message})")));
+            }
+        });
+        Ok(Gpu { device, queue, adapter: info, fault })
+    }
+
+    /// Whether all that was asked for was done so far.
+    ///
+    /// # Errors
+    /// If memory ran out, the device was lost, or it was asked for something that it cannot do.
+    pub fn check(&self) -> Result<(), GpuError> {
+        match self.fault.get() {
+            None => Ok(()),
+            Some(reason) => Err(GpuError::Lost { adapter: self.adapter.name.clone(), reason: reason.clone() }),
+        }
     }
 
     /// Whether the adapter is a processor that does a GPU's work.

@@ -18,6 +18,6 @@ pub mod sea;
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};
-pub use renderer::{Renderer, SHADERS, Triangles};
+pub use renderer::{Renderer, SHADERS, TooMany, Triangles};
 pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;

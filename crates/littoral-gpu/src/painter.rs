@@ -2,7 +2,7 @@
 
 use crate::device::{Gpu, GpuError};
 use crate::frame::Look;
-use crate::renderer::{Renderer, Triangles};
+use crate::renderer::{Renderer, TooMany, Triangles};
 use crate::scenery::{Scenery, TooLarge};
 use glam::{UVec2, Vec2};
 use littoral::field::HeightField;
@@ -29,6 +29,9 @@ pub enum PainterError {
     /// Too many samples.
     #[error(transparent)]
     TooLarge(#[from] TooLarge),
+    /// Too many triangles.
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
     /// A picture larger than the device's textures.
     #[error(
         "expected a picture of at most {most} pixels a side, which is what this graphics adapter draws, got {got}; draw it smaller, or on the processor"
@@ -62,6 +65,7 @@ impl Painter {
         let height = f64::from(stage.land().height_range().high).max(2.0);
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
+        gpu.check()?;
         Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), white: tables.white })
     }
 
@@ -73,7 +77,7 @@ impl Painter {
     /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times; water is still. `progress` is told the fraction done.
     ///
     /// # Errors
-    /// If the picture is larger than the device's textures, or the device was lost.
+    /// If the picture or the mesh is larger than the device's textures or buffers, or the device was lost.
     pub fn picture(
         &mut self,
         stage: &Stage,
@@ -90,7 +94,7 @@ impl Painter {
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
-        self.ground.set(gpu, ground);
+        self.ground.set(gpu, ground)?;
         let looks = looks.max(1);
         let share = 1.0 / looks as f32;
         let mut picture = Picture::empty(view.size, view.eye);

@@ -41,10 +41,20 @@ pub struct Triangles {
 
 impl Triangles {
     /// Brings a mesh to the device, in memory used before if that is large enough.
-    pub fn set(&mut self, gpu: &Gpu, mesh: &Mesh) {
+    ///
+    /// # Errors
+    /// If it is larger than the device's buffers can be; then nothing changes.
+    pub fn set(&mut self, gpu: &Gpu, mesh: &Mesh) -> Result<(), TooMany> {
+        let most = gpu.device.limits().max_buffer_size;
+        let bytes = size_of_val(&mesh.vertices[..]).max(size_of_val(&mesh.triangles[..])) as u64;
+        let triangles = mesh.triangles.len();
+        if bytes > most || triangles > (u32::MAX / 3) as usize {
+            return Err(TooMany { triangles, megabytes: most >> 20 });
+        }
         fill(gpu, &mut self.vertices, "vertices", VERTICES, bytemuck::cast_slice(&mesh.vertices));
         fill(gpu, &mut self.corners, "triangles", CORNERS, bytemuck::cast_slice(&mesh.triangles));
-        self.count = 3 * mesh.triangles.len() as u32;
+        self.count = 3 * triangles as u32;
+        Ok(())
     }
 
     /// How many triangles there are.
@@ -58,6 +68,18 @@ impl Triangles {
     }
 }
 
+/// A mesh that does not fit into the device's buffers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "expected a mesh that fits into {megabytes} MiB, which is what this graphics adapter's buffers hold, got {triangles} triangles; allow fewer of them"
+)]
+pub struct TooMany {
+    /// Its triangles.
+    pub triangles: usize,
+    /// What a buffer holds at most.
+    pub megabytes: u64,
+}
+
 const VERTICES: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::STORAGE);
 const CORNERS: wgpu::BufferUsages = wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE);
 
@@ -69,7 +91,7 @@ fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::
         Some(kept) => buffer.insert(kept),
         None => buffer.insert(gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
-            size: (size + size / 2).next_multiple_of(256).max(256),
+            size: (size + size / 2).next_multiple_of(256).clamp(256, gpu.device.limits().max_buffer_size),
             usage: usage | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })),
@@ -320,7 +342,8 @@ impl Renderer {
         pass.draw(0..3, 0..1);
     }
 
-    /// Records the pass that draws the edges of triangles over what was shown: onto a target of the size that was drawn. What lies behind the ground is hidden.
+    /// Records the pass that draws the edges of triangles over what was shown: onto a target of the size that was drawn. What lies behind the ground is hidden. Of
+    /// more triangles than shaders can read there are no edges.
     pub fn wires(
         &self,
         gpu: &Gpu,
@@ -333,6 +356,10 @@ impl Renderer {
         else {
             return;
         };
+        let most = gpu.device.limits().max_storage_buffer_binding_size;
+        if vertices.size().max(corners.size()) > most {
+            return; // shaders could not read all of them
+        }
         let buffers = [(0, &self.uniforms), (16, vertices), (17, corners)];
         let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("wires"),
@@ -416,6 +443,7 @@ impl Renderer {
         );
         gpu.queue.submit([encoder.finish()]);
         buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        gpu.check()?;
         let lost =
             |e: &dyn std::fmt::Display| GpuError::Lost { adapter: gpu.adapter.name.clone(), reason: e.to_string() };
         gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
