@@ -56,8 +56,9 @@ fn display() -> Option<(String, Ended)> {
         println!("the window goes untested: {} not installed", missing.join(", "));
         return None;
     }
+    // Without `-noreset` it begins anew, and refuses whoever comes meanwhile, each time that the last of its guests leaves.
     let mut server = Command::new("Xvfb")
-        .args(["-displayfd", "1", "-screen", "0", "1000x600x24", "-nolisten", "tcp"])
+        .args(["-displayfd", "1", "-noreset", "-screen", "0", "1000x600x24", "-nolisten", "tcp"])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
@@ -69,7 +70,14 @@ fn display() -> Option<(String, Ended)> {
         println!("the window goes untested: Xvfb opened no display");
         return None;
     }
-    Some((format!(":{}", number.trim()), server))
+    let display = format!(":{}", number.trim());
+    wait(20, "a display that answers", || {
+        let mut asked = Command::new("xdotool");
+        let asked =
+            asked.arg("getdisplaygeometry").env("DISPLAY", &display).stdout(Stdio::null()).stderr(Stdio::null());
+        asked.status().is_ok_and(|status| status.success()).then_some(())
+    });
+    Some((display, server))
 }
 
 /// Width, height and pixels of a picture.
