@@ -37,25 +37,23 @@ fn film(light: vec3f) -> vec3f {
     return saturate(outset * saturate(grey + (contrasted - grey) * 1.28));
 }
 
-// A pixel as it is shown.
-fn shown_at(at: vec2i) -> vec3f {
+fn radiance_at(at: vec2i) -> vec3f {
     let last = vec2i(textureDimensions(radiance_map)) - 1;
-    return film(textureLoad(radiance_map, clamp(at, vec2i(0), last), 0).rgb * shown.scale.rgb);
+    return textureLoad(radiance_map, clamp(at, vec2i(0), last), 0).rgb;
 }
 
 @fragment
 fn display(@builtin(position) position: vec4f) -> @location(0) vec4f {
-    var encoded: vec3f;
-    if all(shown.how.yz == vec2f(1.0)) {
-        encoded = shown_at(vec2i(position.xy));
-    } else {
+    var radiance = radiance_at(vec2i(position.xy * shown.how.yz));
+    if any(shown.how.yz != vec2f(1.0)) {
         // Between the four nearest pixels.
         let p = position.xy * shown.how.yz - 0.5;
         let i = vec2i(floor(p));
         let f = p - floor(p);
-        let top = mix(shown_at(i), shown_at(i + vec2i(1, 0)), f.x);
-        encoded = mix(top, mix(shown_at(i + vec2i(0, 1)), shown_at(i + 1), f.x), f.y);
+        let top = mix(radiance_at(i), radiance_at(i + vec2i(1, 0)), f.x);
+        radiance = mix(top, mix(radiance_at(i + vec2i(0, 1)), radiance_at(i + 1), f.x), f.y);
     }
+    let encoded = film(radiance * shown.scale.rgb);
     if shown.how.x == 0.0 {
         return vec4f(encoded, 1.0);
     }
