@@ -14,10 +14,12 @@ mod painter;
 mod renderer;
 mod scenery;
 pub mod sea;
+mod triangles;
 
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};
-pub use renderer::{Renderer, SHADERS, TooMany, Triangles};
+pub use renderer::{Renderer, SHADERS};
 pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
+pub use triangles::{TooMany, Triangles};

@@ -2,8 +2,9 @@
 
 use crate::device::{Gpu, GpuError};
 use crate::frame::Look;
-use crate::renderer::{Renderer, TooMany, Triangles};
+use crate::renderer::Renderer;
 use crate::scenery::{Scenery, TooLarge};
+use crate::triangles::{TooMany, Triangles};
 use glam::{UVec2, Vec2};
 use littoral::field::HeightField;
 use littoral::lod::Mesh;

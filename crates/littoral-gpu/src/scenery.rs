@@ -121,10 +121,7 @@ impl Scenery {
         };
         let rim_size = [tables.rim.columns.max(1) as u32, tables.rim.rows.max(2) as u32, 1];
         let points = tables.skylight.values.len();
-        let layers = (0..9).flat_map(|k| (0..points).map(move |i| (k, i))).map(|(k, i)| {
-            let light = tables.skylight.values[i][k] * GAIN;
-            (light, if k == 0 { tables.sunny[i] } else { 0.0 })
-        });
+        let layers = (0..9).flat_map(|k| (0..points).map(move |i| (tables.skylight.values[i][k] * GAIN, 0.0)));
         let skylight = halves(layers);
         let depths = tables.depths.iter().map(|d| (d.0, 0.0)).chain(tables.depths.iter().map(|d| (d.1, 0.0)));
         let [azimuths, elevations, distances] = Tables::SKY.map(|n| n as u32);

@@ -5,7 +5,7 @@
 @group(0) @binding(7) var eye_light: texture_3d<f32>;
 @group(0) @binding(8) var eye_through: texture_2d<f32>;
 @group(0) @binding(9) var land_light: texture_3d<f32>;
-// Nine harmonics of light from all sides; the alpha of the first is how much of the sun is seen.
+// Nine harmonics of light from all sides.
 @group(0) @binding(10) var skylight_map: texture_2d_array<f32>;
 // Sunlight by height.
 @group(0) @binding(11) var sunlight_map: texture_2d<f32>;
@@ -110,14 +110,7 @@ fn irradiance_at(rel: vec2f, normal: vec3f) -> vec3f {
     return max(sum, vec3f(0.0)) / GAIN;
 }
 
-// How much of the sun is seen, coarsely.
-fn sunny_at(rel: vec2f) -> f32 {
-    let size = vec2f(textureDimensions(skylight_map));
-    let uv = (clamp(frame.skylight.xy + rel * frame.skylight.zw, vec2f(0.0), size - 1.0) + 0.5) / size;
-    return textureSampleLevel(skylight_map, smooth_sampler, uv, 0, 0.0).a;
-}
-
-// The same from all around on an open plain.
+// Irradiance (klx) of the light over an open plain.
 fn irradiance_open(normal: vec3f) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0; i < 9; i++) {

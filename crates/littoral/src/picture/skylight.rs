@@ -106,11 +106,6 @@ impl Skylight {
         Lattice { columns, rows, origin, spacing: step, values: self.lights.clone() }
     }
 
-    /// How much of the sun's disc each of them sees.
-    pub fn sunny_points(&self) -> &[f32] {
-        &self.sunny
-    }
-
     /// Light arriving at a world position (m).
     pub fn at(&self, at: DVec2) -> Light {
         let ([a, b, c, d], f) = self.corners(at);

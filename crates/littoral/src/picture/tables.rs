@@ -59,8 +59,6 @@ pub struct Tables {
     pub land: (DVec2, DVec2),
     /// Light from all sides: nine spherical harmonics of radiance (kcd/m²).
     pub skylight: Lattice<[Vec3; 9]>,
-    /// How much of the sun is seen, coarsely, at the same points.
-    pub sunny: Vec<f32>,
     /// The same over an open plain.
     pub open: [Vec3; 9],
     /// Sunlight on a facing surface (klx) at heights of `AIR` · (i / (n − 1))².
@@ -164,7 +162,6 @@ impl Stage<'_> {
             rim,
             land,
             skylight: self.skylight.lattice(),
-            sunny: self.skylight.sunny_points().to_vec(),
             open: self.skylight.open,
             sunlight: self.air.sunlight_table().to_vec(),
             depths: self.depths.table().to_vec(),

@@ -1,0 +1,73 @@
+//! Triangles of a surface on the device.
+
+use crate::device::Gpu;
+use littoral::lod::Mesh;
+
+/// Triangles of a surface on the device.
+#[derive(Debug, Default)]
+pub struct Triangles {
+    pub(crate) vertices: Option<wgpu::Buffer>,
+    pub(crate) corners: Option<wgpu::Buffer>,
+    /// Three times the triangles.
+    pub(crate) count: u32,
+}
+
+impl Triangles {
+    /// Brings a mesh to the device, in memory used before if that is large enough.
+    ///
+    /// # Errors
+    /// If it is larger than the device's buffers can be; then nothing changes.
+    pub fn set(&mut self, gpu: &Gpu, mesh: &Mesh) -> Result<(), TooMany> {
+        let most = gpu.device.limits().max_buffer_size;
+        let bytes = size_of_val(&mesh.vertices[..]).max(size_of_val(&mesh.triangles[..])) as u64;
+        let triangles = mesh.triangles.len();
+        if bytes > most || triangles > (u32::MAX / 3) as usize {
+            return Err(TooMany { triangles, megabytes: most >> 20 });
+        }
+        fill(gpu, &mut self.vertices, "vertices", VERTICES, bytemuck::cast_slice(&mesh.vertices));
+        fill(gpu, &mut self.corners, "triangles", CORNERS, bytemuck::cast_slice(&mesh.triangles));
+        self.count = 3 * triangles as u32;
+        Ok(())
+    }
+
+    /// How many triangles there are.
+    pub fn len(&self) -> usize {
+        self.count as usize / 3
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+}
+
+/// A mesh that does not fit into the device's buffers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "expected a mesh that fits into {megabytes} MiB, which is what this graphics adapter's buffers hold, got {triangles} triangles; allow fewer of them"
+)]
+pub struct TooMany {
+    /// Its triangles.
+    pub triangles: usize,
+    /// What a buffer holds at most.
+    pub megabytes: u64,
+}
+
+const VERTICES: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::STORAGE);
+const CORNERS: wgpu::BufferUsages = wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE);
+
+/// Writes bytes into a buffer, making a new one half as large again where they do not fit.
+fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) {
+    let size = bytes.len() as u64;
+    let room = |buffer: &wgpu::Buffer| buffer.size() >= size;
+    let buffer = match buffer.take().filter(room) {
+        Some(kept) => buffer.insert(kept),
+        None => buffer.insert(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: (size + size / 2).next_multiple_of(256).clamp(256, gpu.device.limits().max_buffer_size),
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })),
+    };
+    gpu.queue.write_buffer(buffer, 0, bytes);
+}
