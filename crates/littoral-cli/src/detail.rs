@@ -204,7 +204,7 @@ impl Chooser<'_> {
             return Ok(stage.render_meshes(&self.meshes(), sea, view, settings, told));
         };
         let ground = self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh);
-        let painted = painter.picture(stage, ground, view, settings.samples, &|done| told(done));
+        let painted = painter.picture(stage, Some(ground), view, settings.samples, &|done| told(done));
         self.painter = Some(painter);
         painted.map_err(|e| Failure::Work(format!("--gpu: {e}")))
     }

@@ -11,6 +11,7 @@
 mod device;
 mod frame;
 mod painter;
+pub mod rays;
 mod renderer;
 mod scenery;
 pub mod sea;
@@ -19,7 +20,8 @@ mod triangles;
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};
-pub use renderer::{Renderer, SHADERS};
+pub use rays::{ShapeError, ShapeTexture};
+pub use renderer::{Ground, Renderer, SHADERS};
 pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
 pub use triangles::{TooMany, Triangles};

@@ -2,7 +2,8 @@
 
 use crate::device::{Gpu, GpuError};
 use crate::frame::Look;
-use crate::renderer::Renderer;
+use crate::rays::{ShapeError, ShapeTexture};
+use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
 use crate::triangles::{TooMany, Triangles};
 use glam::{UVec2, Vec2};
@@ -17,7 +18,8 @@ pub struct Painter {
     gpu: Gpu,
     renderer: Renderer,
     scenery: Scenery,
-    ground: Triangles,
+    triangles: Triangles,
+    shape: Option<ShapeTexture>,
     white: [f32; 3],
 }
 
@@ -33,6 +35,9 @@ pub enum PainterError {
     /// Too many triangles.
     #[error(transparent)]
     TooMany(#[from] TooMany),
+    /// Too many samples for rays.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
     /// A picture larger than the device's textures.
     #[error(
         "expected a picture of at most {most} pixels a side, which is what this graphics adapter draws, got {got}; draw it smaller, or on the processor"
@@ -67,7 +72,7 @@ impl Painter {
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
         gpu.check()?;
-        Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), white: tables.white })
+        Ok(Painter { gpu, renderer, scenery, triangles: Triangles::default(), shape: None, white: tables.white })
     }
 
     /// What paints.
@@ -75,14 +80,15 @@ impl Painter {
         &self.gpu
     }
 
-    /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times; water is still. `progress` is told the fraction done.
+    /// What a view sees of the stage whose ground is this mesh, or is met by rays, looking through each pixel so many times; water is still. `progress` is told the
+    /// fraction done.
     ///
     /// # Errors
-    /// If the picture or the mesh is larger than the device's textures or buffers, or the device was lost.
+    /// If the picture, the mesh or what rays need is larger than the device's textures or buffers, or the device was lost.
     pub fn picture(
         &mut self,
         stage: &Stage,
-        ground: &Mesh,
+        ground: Option<&Mesh>,
         view: &View,
         looks: u32,
         progress: &dyn Fn(f32),
@@ -95,7 +101,19 @@ impl Painter {
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
-        self.ground.set(gpu, ground)?;
+        let ground = match ground {
+            Some(mesh) => {
+                self.triangles.set(gpu, mesh)?;
+                Ground::Triangles(&self.triangles)
+            }
+            None => {
+                let shape = match self.shape.take() {
+                    Some(shape) => shape,
+                    None => ShapeTexture::new(gpu, stage.land())?,
+                };
+                Ground::Rays { shape: self.shape.insert(shape), pixels: 0.0 }
+            }
+        };
         let looks = looks.max(1);
         let share = 1.0 / looks as f32;
         let mut picture = Picture::empty(view.size, view.eye);
@@ -106,7 +124,7 @@ impl Painter {
             // The first through the middle; all together evenly over the pixel (M. Roberts's R2 sequence, 2018).
             let offset = (Vec2::new(0.754_877_7, 0.569_840_3) * number as f32 + 0.5).fract() - 0.5;
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            self.renderer.draw(gpu, &mut encoder, &self.scenery, &self.ground, view, Look { offset, number });
+            self.renderer.draw(gpu, &mut encoder, &self.scenery, ground, view, Look { offset, number });
             gpu.queue.submit([encoder.finish()]);
             for (i, [red, green, blue, distance]) in self.renderer.read(gpu)?.into_iter().enumerate() {
                 for (sum, seen) in picture.radiance[i].iter_mut().zip([red, green, blue]) {

@@ -2,6 +2,7 @@
 
 use crate::device::{Gpu, GpuError};
 use crate::frame::{Look, Uniforms};
+use crate::rays::ShapeTexture;
 use crate::scenery::Scenery;
 use crate::triangles::Triangles;
 use glam::UVec2;
@@ -28,9 +29,23 @@ pub const SHADERS: [(&str, &str); 4] = [
     ("wires", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/wires.wgsl"))),
 ];
 
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Radiance (kcd/m²), and the distance of what is seen (m), 0 for the sky.
 const RADIANCE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// What tells how far away the ground is.
+#[derive(Clone, Copy, Debug)]
+pub enum Ground<'a> {
+    /// A mesh of it.
+    Triangles(&'a Triangles),
+    /// A ray through each pixel.
+    Rays {
+        /// What they meet.
+        shape: &'a ShapeTexture,
+        /// 0 for exact hits; otherwise squares of ground that are not wider than so many pixels are drawn as high as their highest point.
+        pixels: f32,
+    },
+}
 
 /// What a picture is drawn into before it is shown.
 #[derive(Debug)]
@@ -195,13 +210,13 @@ impl Renderer {
         }))
     }
 
-    /// Records the passes that find what a view sees of a scenery with these triangles of its ground, and its light.
+    /// Records the passes that find what a view sees of a scenery with this ground, and its light.
     pub fn draw(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         scenery: &Scenery,
-        ground: &Triangles,
+        ground: Ground<'_>,
         view: &View,
         look: Look,
     ) {
@@ -218,17 +233,9 @@ impl Renderer {
             }),
             ..Default::default()
         });
-        if let (Some(vertices), Some(corners), false) = (&ground.vertices, &ground.corners, ground.is_empty()) {
-            pass.set_pipeline(&self.surface);
-            let frame = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("frame"),
-                layout: &self.surface.get_bind_group_layout(0),
-                entries: &[wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() }],
-            });
-            pass.set_bind_group(0, &frame, &[]);
-            pass.set_vertex_buffer(0, vertices.slice(..));
-            pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..ground.count, 0, 0..1);
+        match ground {
+            Ground::Triangles(triangles) => self.surface(gpu, &mut pass, triangles),
+            Ground::Rays { shape, pixels } => shape.cast(gpu, &mut pass, &self.uniforms, view, pixels),
         }
         drop(pass);
 
@@ -273,6 +280,23 @@ impl Renderer {
         pass.set_pipeline(&self.shade);
         pass.set_bind_group(0, &everything, &[]);
         pass.draw(0..3, 0..1);
+    }
+
+    /// Records triangles, as far away as they are.
+    fn surface(&self, gpu: &Gpu, pass: &mut wgpu::RenderPass<'_>, ground: &Triangles) {
+        let (Some(vertices), Some(corners), false) = (&ground.vertices, &ground.corners, ground.is_empty()) else {
+            return;
+        };
+        pass.set_pipeline(&self.surface);
+        let frame = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("frame"),
+            layout: &self.surface.get_bind_group_layout(0),
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() }],
+        });
+        pass.set_bind_group(0, &frame, &[]);
+        pass.set_vertex_buffer(0, vertices.slice(..));
+        pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..ground.count, 0, 0..1);
     }
 
     /// Records the pass that draws the edges of triangles over what was shown: onto a target of the size that was drawn. What lies behind the ground is hidden. Of

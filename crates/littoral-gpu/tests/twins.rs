@@ -32,7 +32,7 @@ fn apart(name: &str, stage: &Stage, painter: &mut Painter, view: &View) -> (f64,
     let mesh = mesh(stage.land(), view);
     let settings = Settings { samples: 8, ..Settings::default() };
     let expected = stage.render(view, &settings, &|_| {});
-    let painted = painter.picture(stage, &mesh, view, 8, &|_| {}).expect("a picture");
+    let painted = painter.picture(stage, Some(&mesh), view, 8, &|_| {}).expect("a picture");
     let how = Display { exposure: Exposure::Grey(expected.grey()), ..Display::default() };
     let (a, b) = (expected.display(&how), painted.display(&how));
     let steps = |(a, b): (&[u8; 3], &[u8; 3])| [0, 1, 2].map(|i| a[i].abs_diff(b[i]));
@@ -88,7 +88,7 @@ fn the_same_picture_twice_and_nothing_from_a_map() {
     let stage = Stage::new(&scene);
     let mesh = mesh(stage.land(), &shot.view);
     let mut painter = Painter::new(gpu.clone(), &stage).expect("a natural scene");
-    let mut paint = || painter.picture(&stage, &mesh, &shot.view, 2, &|_| {}).expect("a picture").radiance;
+    let mut paint = || painter.picture(&stage, Some(&mesh), &shot.view, 2, &|_| {}).expect("a picture").radiance;
     let first = paint();
     assert_eq!(first, paint());
     assert!(first.iter().flatten().all(|v| v.is_finite()) && first.iter().any(|v| v[0] > 0.1));
