@@ -31,8 +31,8 @@ pub struct Detail {
     /// Draw the mesh's edges, too
     #[arg(long, requires = "lod", conflicts_with = "gpu", help_heading = "Mesh")]
     pub wireframe: bool,
-    /// Draw on the graphics card (or what stands for one): in natural colours, and so far with still water
-    /// [default mesh: patches]
+    /// Draw on the graphics card (or what stands for one): in natural colours, and so far with still water; the exact
+    /// surface, or the mesh of --lod
     #[arg(long, conflicts_with = "passes", help_heading = "Mesh")]
     pub gpu: bool,
     /// Choose the mesh for an eye at this place that looks at the same point, and look at it from --eye
@@ -82,8 +82,41 @@ pub struct Chooser<'a> {
     water: Option<Box<dyn Lod>>,
     water_drawing: Drawing,
     shows_water: bool,
-    /// What draws instead of the processor.
-    painter: Option<Painter>,
+}
+
+/// What pictures are drawn by: rays or a mesh, on the processor or the graphics card.
+pub struct Drawer<'a> {
+    /// What chooses the mesh, if one is to be drawn.
+    pub chooser: Option<Chooser<'a>>,
+    /// The graphics card, if it is to draw.
+    pub painter: Option<Painter>,
+}
+
+impl Drawer<'_> {
+    /// Chooses the meshes for a view, if such are drawn.
+    pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Option<Told>, Failure> {
+        self.chooser.as_mut().map(|chooser| chooser.choose(sea, view)).transpose()
+    }
+
+    /// The picture, of what was chosen last if meshes are drawn.
+    pub fn picture(
+        &mut self,
+        stage: &Stage,
+        sea: Option<&Sea>,
+        view: &View,
+        settings: &Settings,
+        told: &(dyn Fn(f32) + Sync),
+    ) -> Result<Picture, Failure> {
+        let ground = self.chooser.as_ref().map(Chooser::ground);
+        if let Some(painter) = &mut self.painter {
+            let painted = painter.picture(stage, ground, view, settings.samples, &|done| told(done));
+            return painted.map_err(|e| Failure::Work(format!("--gpu: {e}")));
+        }
+        Ok(match &self.chooser {
+            Some(chooser) => stage.render_meshes(&chooser.meshes(), sea, view, settings, told),
+            None => stage.render_sea(sea, view, settings, told),
+        })
+    }
 }
 
 /// What is told about a mesh.
@@ -100,6 +133,11 @@ pub struct Told {
 }
 
 impl Detail {
+    /// Whether it is the exact surface that is drawn, on the processor.
+    pub fn is_default(&self) -> bool {
+        self.lod.is_none() && !self.gpu
+    }
+
     /// What lets ROAM go on from picture to picture over a land, if that is what is wanted and the land is not too large.
     pub fn prepare(&self, land: &Land) -> Option<NestedBounds> {
         if self.lod != Some(Method::Roam) {
@@ -123,7 +161,6 @@ impl Detail {
             water: None,
             water_drawing: Drawing::default(),
             shows_water: false,
-            painter: None,
         })
     }
 
@@ -186,33 +223,15 @@ impl Chooser<'_> {
         Ok(told)
     }
 
-    /// Draws on the graphics card from now on.
-    pub fn paint_with(&mut self, painter: Option<Painter>) {
-        self.painter = painter;
-    }
-
-    /// The picture of what was chosen last.
-    pub fn picture(
-        &mut self,
-        stage: &Stage,
-        sea: Option<&Sea>,
-        view: &View,
-        settings: &Settings,
-        told: &(dyn Fn(f32) + Sync),
-    ) -> Result<Picture, Failure> {
-        let Some(mut painter) = self.painter.take() else {
-            return Ok(stage.render_meshes(&self.meshes(), sea, view, settings, told));
-        };
-        let ground = self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh);
-        let painted = painter.picture(stage, Some(ground), view, settings.samples, &|done| told(done));
-        self.painter = Some(painter);
-        painted.map_err(|e| Failure::Work(format!("--gpu: {e}")))
+    /// The mesh of the ground that was chosen last.
+    fn ground(&self) -> &Mesh {
+        self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)
     }
 
     /// What was chosen last.
     fn meshes(&self) -> Meshes<'_> {
         Meshes {
-            ground: Some(self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)),
+            ground: Some(self.ground()),
             water: self.shows_water.then_some(&self.water_drawing.mesh),
             wireframe: self.detail.wireframe,
         }

@@ -1,6 +1,6 @@
 //! `littoral render`: pictures and films.
 
-use crate::detail::{Detail, Method, Told};
+use crate::detail::{Detail, Drawer, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
@@ -234,26 +234,19 @@ impl Render {
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
             let prepared = self.detail.prepare(stage.land());
-            let mut chooser = self.detail.chooser(stage.land(), prepared.as_ref());
-            if let Some(chooser) = &mut chooser {
-                chooser.paint_with(self.detail.painter(&stage, talk)?);
-            }
-            return film.run(&subject, &stage, sea.as_mut(), chooser, &settings, started, talk);
+            let chooser = self.detail.chooser(stage.land(), prepared.as_ref());
+            let drawer = Drawer { chooser, painter: self.detail.painter(&stage, talk)? };
+            return film.run(&subject, &stage, sea.as_mut(), drawer, &settings, started, talk);
         }
 
         let mesh_view = self.detail.view(&self, &subject, &shot.view, look, talk)?;
         let waves = sea.as_ref().filter(|_| stage.shows_waves());
-        let mut chooser = self.detail.chooser(stage.land(), None);
-        let chosen = chooser.as_mut().map(|chooser| chooser.choose(waves, &mesh_view)).transpose()?;
-        if let Some(chooser) = &mut chooser {
-            chooser.paint_with(self.detail.painter(&stage, talk)?);
-        }
+        let mut drawer = Drawer { chooser: self.detail.chooser(stage.land(), None), painter: None };
+        let chosen = drawer.choose(waves, &mesh_view)?;
+        drawer.painter = self.detail.painter(&stage, talk)?;
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
-        let picture = match &mut chooser {
-            Some(chooser) => chooser.picture(&stage, sea.as_ref(), &shot.view, &settings, &told)?,
-            None => stage.render_sea(sea.as_ref(), &shot.view, &settings, &told),
-        };
+        let picture = drawer.picture(&stage, sea.as_ref(), &shot.view, &settings, &told)?;
         bar.finish_and_clear();
         let passes = self.save(&picture, &out, &subject)?;
 
@@ -327,7 +320,7 @@ impl Render {
                 shot.style,
                 self.water,
                 self.time,
-                self.detail.lod.map_or(String::new(), |_| format!(" {:?}", self.detail))
+                if self.detail.is_default() { String::new() } else { format!(" {:?}", self.detail) }
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,
@@ -344,9 +337,6 @@ impl Render {
         {
             self.files.push(path.clone());
             self.path = Some("orbit".into());
-        }
-        if self.detail.gpu {
-            self.detail.lod.get_or_insert(Method::Patches);
         }
         match (self.style, &self.texture) {
             (Some(StyleName::Image), None) => {
