@@ -12,9 +12,11 @@ mod device;
 mod frame;
 mod painter;
 pub mod rays;
+mod read;
 mod renderer;
 mod scenery;
 pub mod sea;
+mod times;
 mod triangles;
 
 pub use device::{Gpu, GpuError};
@@ -24,4 +26,5 @@ pub use rays::{ShapeError, ShapeTexture};
 pub use renderer::{Ground, Renderer, SHADERS};
 pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
+pub use times::PassTimes;
 pub use triangles::{TooMany, Triangles};

@@ -15,6 +15,7 @@
 //! on a node's border, too, so that they bound the bilinear surface.
 
 use crate::device::{Gpu, GpuError};
+use crate::read::read;
 use crate::renderer::DEPTH;
 use crate::scenery::TooLarge;
 use bytemuck::{Pod, Zeroable};
@@ -216,9 +217,8 @@ impl ShapeTexture {
     /// # Errors
     /// If the device was lost.
     pub fn ranges(&self, gpu: &Gpu) -> Result<Vec<HeightRange>, GpuError> {
-        let bytes = read(gpu, &self.ranges, self.ranges.size())?;
-        let pairs: &[[f32; 2]] = bytemuck::cast_slice(&bytes);
-        Ok(pairs.iter().map(|&[low, high]| HeightRange { low, high }).collect())
+        let pairs: Vec<[f32; 2]> = read(gpu, &self.ranges, self.ranges.size())?;
+        Ok(pairs.into_iter().map(|[low, high]| HeightRange { low, high }).collect())
     }
 
     /// The distance to the first hit of each ray (in lengths of its direction), infinity where there is none, from above and below. Origins count from `anchor`, which
@@ -265,9 +265,8 @@ impl ShapeTexture {
             pass.dispatch_workgroups(part.len().div_ceil(64) as u32, 1, 1);
             drop(pass);
             gpu.queue.submit([encoder.finish()]);
-            let bytes = read(gpu, &answers, size)?;
-            let met = bytemuck::cast_slice(&bytes).iter();
-            distances.extend(met.map(|&met: &f32| if met < NEVER { met } else { f32::INFINITY }));
+            let met: Vec<f32> = read(gpu, &answers, size)?;
+            distances.extend(met.into_iter().map(|met| if met < NEVER { met } else { f32::INFINITY }));
         }
         Ok(distances)
     }
@@ -456,23 +455,4 @@ fn passes(
         (pipeline.clone(), group, [made[1].div_ceil(8), made[2].div_ceil(8)])
     });
     passes.collect()
-}
-
-/// The first bytes of a buffer, read back.
-fn read(gpu: &Gpu, buffer: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
-    let readable = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("read back"),
-        size,
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &readable, 0, size);
-    gpu.queue.submit([encoder.finish()]);
-    readable.map_async(wgpu::MapMode::Read, .., |_| {});
-    gpu.check()?;
-    let lost = |e: &dyn std::fmt::Display| GpuError::Lost { adapter: gpu.adapter.name.clone(), reason: e.to_string() };
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
-    let mapped = readable.get_mapped_range(..).map_err(|e| lost(&e))?;
-    Ok(mapped.to_vec())
 }

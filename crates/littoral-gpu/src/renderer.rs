@@ -4,6 +4,7 @@ use crate::device::{Gpu, GpuError};
 use crate::frame::{Look, Uniforms};
 use crate::rays::ShapeTexture;
 use crate::scenery::Scenery;
+use crate::times::PassTimes;
 use crate::triangles::Triangles;
 use glam::UVec2;
 use littoral::lod::Vertex;
@@ -67,6 +68,8 @@ pub struct Renderer {
     uniforms: wgpu::Buffer,
     shown: wgpu::Buffer,
     canvas: Option<Canvas>,
+    /// Where pictures leave how long their passes took.
+    pub times: Option<PassTimes>,
 }
 
 impl Renderer {
@@ -185,6 +188,7 @@ impl Renderer {
             uniforms: uniform("frame", size_of::<Uniforms>() as u64),
             shown: uniform("shown", 32),
             canvas: None,
+            times: None,
         }
     }
 
@@ -210,8 +214,8 @@ impl Renderer {
         }))
     }
 
-    /// Records the passes that find what a view sees of a scenery with this ground, and its light.
-    pub fn draw(
+    /// Records the first pass of a picture alone: how far away the ground is.
+    pub fn distances(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
@@ -231,14 +235,27 @@ impl Renderer {
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             }),
+            timestamp_writes: self.times.as_ref().and_then(|times| times.of("surface")),
             ..Default::default()
         });
         match ground {
             Ground::Triangles(triangles) => self.surface(gpu, &mut pass, triangles),
             Ground::Rays { shape, pixels } => shape.cast(gpu, &mut pass, &self.uniforms, view, pixels),
         }
-        drop(pass);
+    }
 
+    /// Records the passes that find what a view sees of a scenery with this ground, and its light.
+    pub fn draw(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        scenery: &Scenery,
+        ground: Ground<'_>,
+        view: &View,
+        look: Look,
+    ) {
+        self.distances(gpu, encoder, scenery, ground, view, look);
+        let Some(canvas) = &self.canvas else { return };
         let radiance = canvas.radiance.create_view(&Default::default());
         let textures = [
             &scenery.fine,
@@ -275,6 +292,7 @@ impl Renderer {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shade"),
             color_attachments: &[Some(onto(&radiance, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
+            timestamp_writes: self.times.as_ref().and_then(|times| times.of("shade")),
             ..Default::default()
         });
         pass.set_pipeline(&self.shade);
