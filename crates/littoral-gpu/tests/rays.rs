@@ -1,10 +1,11 @@
 //! Rays on the GPU against the processor's. Where there is no adapter these tests say so and pass; that the shaders are sound is tested without one.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, UVec2, Vec3};
 use littoral::field::{HeightRange, Land, Raster, coast};
+use littoral::picture::{Scene, Stage};
 use littoral::raycast::LocalRay;
-use littoral::space::Ray;
-use littoral_gpu::{Gpu, ShapeTexture};
+use littoral::space::{Ray, View};
+use littoral_gpu::{Gpu, Painter, ShapeError, ShapeTexture};
 
 fn gpu() -> Option<Gpu> {
     match Gpu::headless() {
@@ -250,4 +251,165 @@ fn the_pyramid_is_the_processors() {
         }
         assert_eq!(at, got.len());
     }
+}
+
+#[test]
+fn far_from_the_origin_nothing_is_lost() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(3);
+    let near = rough(&mut random, [80, 90], DVec2::new(2.0, 1.5), 9.0, 4.0);
+    // Whole multiples of the spacing, so that both lands have the same samples.
+    let away = DVec3::new(4_600_000.0, -3_300_000.0, 0.0);
+    let far = Land::at(near.raster().clone(), near.origin() + away.truncate());
+    let shapes = [&near, &far].map(|land| ShapeTexture::new(&gpu, land).expect("a small land"));
+    let anchor = DVec3::new(33.25, 61.5, 14.0);
+    let rays: Vec<LocalRay> = (0..4000).map(|i| local(anchor, &ray(&mut random, &near, i % KINDS))).collect();
+    let hits = [(&shapes[0], anchor), (&shapes[1], anchor + away)];
+    let [a, b] = hits.map(|(shape, anchor)| shape.first_hits(&gpu, anchor, &rays).expect("a device"));
+    assert!(a.iter().filter(|hit| hit.is_finite()).count() > 1000);
+    assert_eq!(a, b);
+}
+
+#[test]
+fn nothing_slips_through_between_patches() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(5);
+    let mut all = 0;
+    for spacing in [DVec2::ONE, DVec2::new(0.7, 3.1)] {
+        let land = rough(&mut random, [65, 41], spacing, 60.0, 0.0);
+        let shape = ShapeTexture::new(&gpu, &land).expect("a small land");
+        let HeightRange { low, high } = land.height_range();
+        let anchor = land.origin().extend(0.0) + DVec3::new(7.3, 11.9, f64::from(high));
+        let inner = |random: &mut Random, n: usize| 1.0 + (random.next() * (n - 2) as f64).floor();
+        // Down to a sample, or to a point on the line between two, far below the surface: on the way there it must be met.
+        let rays: Vec<LocalRay> = (0..30_000)
+            .map(|i| {
+                let mut to = DVec2::new(inner(&mut random, 65), inner(&mut random, 41));
+                match i % 3 {
+                    0 => to.x += random.next(),
+                    1 => to.y += random.next(),
+                    _ => {}
+                }
+                let to = (land.origin() + to * spacing).extend(f64::from(low) - 5.0);
+                let from = DVec2::new(random.between(4.0, 60.0), random.between(4.0, 36.0));
+                let from = match i % 4 {
+                    // Straight down, and along the line.
+                    0 => to.truncate(),
+                    1 => DVec2::new((land.origin() + from * spacing).x, to.y),
+                    2 => DVec2::new(to.x, (land.origin() + from * spacing).y),
+                    _ => land.origin() + from * spacing,
+                };
+                local(anchor, &Ray::between(from.extend(f64::from(high) + 1.0), to))
+            })
+            .collect();
+        let hits = shape.first_hits(&gpu, anchor, &rays).expect("a device");
+        let missed = hits.iter().position(|hit| !hit.is_finite());
+        assert!(missed.is_none(), "{:?} slips through", missed.map(|i| rays[i]));
+        all += hits.len();
+    }
+    println!("{all} rays at lines and corners, all met");
+}
+
+#[test]
+fn a_cone_stops_at_nodes_as_wide_as_it() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(9);
+    let land = coast::coast();
+    let shape = ShapeTexture::new(&gpu, &land).expect("a small land");
+    let spacing = land.raster().spacing();
+    let (columns, rows) = (land.raster().columns() as i64, land.raster().rows() as i64);
+    let anchor = (land.origin() + 0.5 * land.extent()).extend(300.0);
+    let exact: Vec<LocalRay> = (0..6000).map(|_| local(anchor, &ray(&mut random, &land, 0))).collect();
+    let cones: Vec<LocalRay> =
+        exact.iter().map(|ray| LocalRay { spread: 0.02 * ray.direction.length(), ..*ray }).collect();
+    let [exact_hits, hits] = [&exact, &cones].map(|rays| shape.first_hits(&gpu, anchor, rays).expect("a device"));
+    let mut earlier = 0;
+    for ((ray, exact), got) in cones.iter().zip(exact_hits).zip(hits) {
+        let slack = 1e-3 + 1e-5 * exact.min(1e9);
+        assert!(got <= exact + slack, "{got} after the exact {exact} of {ray:?}");
+        if got >= exact - slack {
+            continue;
+        }
+        earlier += 1;
+        // Some ground that the cone covers reaches up to it.
+        let point = exactly(anchor, ray).at(f64::from(got));
+        let width = f64::from(ray.spread * got) / spacing.min_element();
+        let place = (point.truncate() - land.origin()) / spacing;
+        let window = |at: f64, n: i64| {
+            ((at - width).floor() as i64 - 1).clamp(0, n - 1)..=((at + width).ceil() as i64 + 1).clamp(0, n - 1)
+        };
+        let samples = window(place.y, rows).flat_map(|row| window(place.x, columns).map(move |column| (column, row)));
+        let heights = samples.map(|(column, row)| land.raster().heights()[(row * columns + column) as usize]);
+        let (low, high) = heights.fold((f32::MAX, f32::MIN), |(low, high), h| (low.min(h), high.max(h)));
+        let z = point.z as f32;
+        assert!(z <= high + 0.05 && z >= low - 0.05, "{z} is not within {low}..{high}: {ray:?}");
+    }
+    println!("{earlier} of {} cones end before the exact hit", cones.len());
+    assert!(earlier > 100);
+}
+
+#[test]
+fn a_pictures_rays_meet_what_the_processors_do() {
+    let Some(gpu) = gpu() else { return };
+    let land = coast::coast();
+    let stage = Stage::new(&Scene::new(&land, None));
+    let mut painter = Painter::new(gpu, &stage).expect("a natural scene");
+    let middle = land.origin() + 0.5 * land.extent();
+    let ground = f64::from(land.height_at(middle).expect("land"));
+    let size = UVec2::new(211, 117);
+    let (mut all, mut off) = (0, 0);
+    for (eye, target) in [
+        (DVec3::new(3380.0, 560.0, 175.0), DVec3::new(2833.0, 2457.0, 5.0)),
+        (middle.extend(ground + 2.0), middle.extend(ground + 2.0) + DVec3::new(-400.0, 900.0, 20.0)),
+        (middle.extend(9000.0), middle.extend(0.0)),
+    ] {
+        let view = View::looking_at(eye, target, 0.9, size);
+        let picture = painter.picture(&stage, None, &view, 1, &|_| {}).expect("a picture");
+        let (corner, right, down) = view.frame();
+        for (i, &got) in picture.depth.iter().enumerate() {
+            let (x, y) = ((i as u32 % size.x) as f32 + 0.5, (i as u32 / size.x) as f32 + 0.5);
+            let direction = (corner + right * x + down * y).as_dvec3().normalize();
+            let exact = stage.land().first_hit(&Ray::new(eye, direction)).map_or(f64::INFINITY, |hit| hit.distance);
+            // Beyond the ground there is mist.
+            if exact.is_finite() {
+                all += 1;
+                off += usize::from((f64::from(got) - exact).abs() > 0.01 + 1e-5 * exact);
+            }
+        }
+    }
+    println!("{off} of {all} pixels are farther off than a centimetre and 10⁻⁵ of their distance");
+    assert!(all > 20_000 && off * 500 < all, "{off} of {all}");
+}
+
+#[test]
+fn what_cannot_be_met_or_held_is_said() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(1);
+    let land = rough(&mut random, [9, 9], DVec2::ONE, 5.0, 0.0);
+    let shape = ShapeTexture::new(&gpu, &land).expect("a small land");
+    let from = (land.origin() + 4.5).extend(100.0).as_vec3();
+    let down = LocalRay::new(from, -Vec3::Z);
+    let bad = [
+        LocalRay::new(from, Vec3::ZERO),
+        LocalRay::new(Vec3::NAN, -Vec3::Z),
+        LocalRay::new(from, Vec3::new(0.0, f32::INFINITY, -1.0)),
+        LocalRay { reach: f32::NAN, ..down },
+        LocalRay { reach: -1.0, ..down },
+        LocalRay { reach: 50.0, ..down },
+    ];
+    let got = shape.first_hits(&gpu, DVec3::ZERO, &bad).expect("a device");
+    assert!(got.iter().all(|&hit| hit == f32::INFINITY), "{got:?}");
+    // Whatever the length of the direction, and beside a bad one.
+    let lengths = [1e-6, 1.0, 1e6].map(|length| LocalRay::new(from, -Vec3::Z * length));
+    let got = shape.first_hits(&gpu, DVec3::ZERO, &lengths).expect("a device");
+    assert!(got.iter().zip([1e-6, 1.0, 1e6]).all(|(hit, length)| (hit * length - got[1]).abs() < 1e-3), "{got:?}");
+    assert!(shape.first_hits(&gpu, DVec3::NAN, &lengths).expect("a device").iter().all(|hit| hit.is_infinite()));
+    assert!(shape.first_hits(&gpu, DVec3::ZERO, &[]).expect("a device").is_empty());
+
+    let most = gpu.device.limits().max_texture_dimension_2d as usize;
+    let long = Raster::new(most + 1, 2, DVec2::ONE, vec![0.0; 2 * (most + 1)]).expect("valid");
+    let refused = ShapeTexture::new(&gpu, &Land::new(long)).expect_err("no texture is that long");
+    assert!(matches!(refused, ShapeError::TooLarge(_)));
+    assert!(refused.to_string().contains(&format!("{} × 2", most + 1)), "{refused}");
+    assert!(gpu.check().is_ok());
 }

@@ -48,7 +48,8 @@ fn blend(h: vec4f, at: vec2f) -> f32 {
 }
 
 // The distance, in lengths of `direction`, at which a ray that starts at `from_` (m from the anchor) first meets the surface, from above or below; `NEVER` beyond
-// `reach`. Where the ray, `spread` metres wide at a distance of one length, is as wide as a node, the node's highest point answers for all of it; 0 for exact hits.
+// `reach`. Where the ray, `spread` metres wide at a distance of one length, is as wide as a node, it meets the node's
+// box; 0 for exact hits.
 fn first_hit(from_: vec3f, direction: vec3f, reach: f32, spread: f32) -> f32 {
     let origin = from_.xy * relief.per_metre + relief.rest;
     let way = direction.xy * relief.per_metre;
@@ -105,9 +106,11 @@ fn first_hit(from_: vec3f, direction: vec3f, reach: f32, spread: f32) -> f32 {
                 let clear_above = min(z0, z1) > high;
                 if !clear_above && max(z0, z1) >= low {
                     if f32(1 << u32(level)) <= width * t {
-                        // As wide as the node, and on its way into it: met where it comes down to the top.
-                        let falls = direction.z < 0.0 && high < z0;
-                        return select(t, clamp((high - z) / select(-1.0, direction.z, falls), t, leave), falls);
+                        // As wide as the node, and on its way into it: met where it comes to its top, or its bottom.
+                        if z0 > high || z0 < low {
+                            return clamp((select(low, high, z0 > high) - z) / direction.z, t, leave);
+                        }
+                        return t;
                     }
                     level -= 1;
                     continue;

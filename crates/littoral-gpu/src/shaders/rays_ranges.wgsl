@@ -21,10 +21,6 @@ fn union_(a: vec2f, b: vec2f) -> vec2f {
     return vec2f(min(a.x, b.x), max(a.y, b.y));
 }
 
-fn height_of(at: vec2u) -> f32 {
-    return textureLoad(heights, at, 0).x;
-}
-
 fn patch_range(a: f32, b: f32, c: f32, d: f32) -> vec2f {
     let high = max(max(a, b), max(c, d));
     return select(vec2f(min(min(a, b), min(c, d)), high), EMPTY, high > VOID);
@@ -35,15 +31,23 @@ fn first(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= step_.made.yz) {
         return;
     }
-    // The samples there are from the node's south-western one on: 3 × 3, or fewer at the border.
+    // 3 × 3 samples from the node's south-western one on; at the border fewer, which are read again in place of what is missing.
     let corner = 2u * id.xy;
-    let last = min(step_.finer.yz - 1u - corner, vec2u(2u));
-    var range = EMPTY;
-    for (var j = 0u; j < last.y; j++) {
-        for (var i = 0u; i < last.x; i++) {
-            let at = corner + vec2u(i, j);
-            range = union_(range, patch_range(height_of(at), height_of(at + vec2u(1u, 0u)), height_of(at + vec2u(0u, 1u)), height_of(at + 1u)));
-        }
+    let last = step_.finer.yz - 1u;
+    var h: array<f32, 9>;
+    for (var k = 0u; k < 9u; k++) {
+        h[k] = textureLoad(heights, min(corner + vec2u(k % 3u, k / 3u), last), 0).x;
+    }
+    var range = patch_range(h[0], h[1], h[3], h[4]);
+    let more = corner + 1u < last;
+    if more.x {
+        range = union_(range, patch_range(h[1], h[2], h[4], h[5]));
+    }
+    if more.y {
+        range = union_(range, patch_range(h[3], h[4], h[6], h[7]));
+    }
+    if all(more) {
+        range = union_(range, patch_range(h[4], h[5], h[7], h[8]));
     }
     ranges[step_.made.x + id.y * step_.made.y + id.x] = range;
 }
