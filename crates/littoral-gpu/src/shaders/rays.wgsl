@@ -169,13 +169,9 @@ fn first_hit(from_: vec3f, direction: vec3f, reach: f32, spread: f32) -> f32 {
         if leave >= end {
             return NEVER;
         }
-        // Across the nearer line. The other coordinate follows, but never back nor out of the node; what counts is the crossing, not the rounded position.
+        // Across the nearer line. The other coordinate follows, but never back nor out of the node: where rounding has it a cell short, that cell is left at once.
         let over_x = next.x <= next.y;
         var follow = vec2i(clamp(floor(origin + leave * way), border.xy, border.zw - 1.0));
-        let not_yet = (vec2f(follow + behind) - origin) * inverse > vec2f(leave);
-        follow -= select(vec2i(0), forward, not_yet & !still);
-        let already = (vec2f(follow + ahead) - origin) * inverse <= vec2f(leave);
-        follow += select(vec2i(0), forward, already & !still);
         // The last cell of the node, and the one beyond the line.
         let last = lines - relief.anchor - ahead;
         follow = select(clamp(follow, last, cell), clamp(follow, cell, last), ahead == vec2i(1));
