@@ -206,9 +206,6 @@ impl Render {
             check_output(save, &inputs)?;
         }
 
-        if self.detail.gpu && self.sea.is_some() {
-            talk.warn("--gpu draws still water so far: --sea is not seen".to_owned());
-        }
         let state = self.sea.as_deref().map(|spec| sea::read(spec, talk)).transpose()?;
         let (reading, full, stretch) = (self.reading, self.full, self.exaggeration);
         let subject = Subject::open(&self.files, reading, full, stretch, self.water, talk)?;
@@ -227,15 +224,12 @@ impl Render {
             ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
         };
         let stage = Stage::new(&scene);
-        let mut sea = match self.detail.gpu {
-            true => None,
-            false => self.waves(state.as_ref(), &subject, talk)?,
-        };
+        let mut sea = self.waves(state.as_ref(), &subject, talk)?;
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
             let prepared = self.detail.prepare(stage.land());
             let chooser = self.detail.chooser(stage.land(), prepared.as_ref());
-            let drawer = Drawer { chooser, painter: self.detail.painter(&stage, talk)? };
+            let drawer = Drawer { chooser, painter: self.detail.painter(&stage, sea.as_ref(), talk)? };
             return film.run(&subject, &stage, sea.as_mut(), drawer, &settings, started, talk);
         }
 
@@ -243,7 +237,7 @@ impl Render {
         let waves = sea.as_ref().filter(|_| stage.shows_waves());
         let mut drawer = Drawer { chooser: self.detail.chooser(stage.land(), None), painter: None };
         let chosen = drawer.choose(waves, &mesh_view)?;
-        drawer.painter = self.detail.painter(&stage, talk)?;
+        drawer.painter = self.detail.painter(&stage, sea.as_ref(), talk)?;
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
         let picture = drawer.picture(&stage, sea.as_ref(), &shot.view, &settings, &told)?;

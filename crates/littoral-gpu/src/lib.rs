@@ -18,6 +18,7 @@ mod scenery;
 pub mod sea;
 mod times;
 mod triangles;
+mod waves;
 
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
@@ -28,3 +29,4 @@ pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
 pub use times::PassTimes;
 pub use triangles::{TooMany, Triangles};
+pub use waves::{WavesError, wave_shaders};

@@ -2,10 +2,11 @@
 
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::Fbm;
-use littoral::field::{Lakes, Land, Raster, Water, coast};
+use littoral::field::{Lakes, Land, Raster, Sea, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Mesh, Patches};
 use littoral::picture::{Border, Display, Exposure, Scene, Settings, Stage, Style, Sun, coast_shot, overhead};
 use littoral::space::View;
+use littoral::waves::SeaState;
 use littoral_gpu::{Gpu, Painter};
 
 fn gpu() -> Option<Gpu> {
@@ -38,11 +39,11 @@ fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> (f64, f64) {
 }
 
 /// Holds pictures by a mesh and by rays against the processor's, and against each other; where `LITTORAL_PICTURES` names a folder they are written there side by side.
-/// At most so many pixels may differ by more than 24 steps.
-fn compare(name: &str, stage: &Stage, painter: &mut Painter, view: &View, most_far: f64) {
+/// From the processor's they may be so far in the mean, and so great a share of pixels may be far off.
+fn compare(name: &str, stage: &Stage, painter: &mut Painter, sea: Option<&Sea>, view: &View, most: (f64, f64)) {
     let mesh = mesh(stage.land(), view);
     let settings = Settings { samples: 8, ..Settings::default() };
-    let expected = stage.render(view, &settings, &|_| {});
+    let expected = stage.render_sea(sea, view, &settings, &|_| {});
     let how = Display { exposure: Exposure::Grey(expected.grey()), ..Display::default() };
     let width = view.size.x as usize;
     let mut shown = vec![expected.display(&how)];
@@ -64,14 +65,14 @@ fn compare(name: &str, stage: &Stage, painter: &mut Painter, view: &View, most_f
         encoder.set_color(png::ColorType::Rgb);
         encoder.write_header().and_then(|mut w| w.write_image_data(pixels.as_flattened())).expect("a picture");
     }
-    for (what, a, b, most, most_far) in [
-        ("mesh against the processor", 1, 0, 4.0, most_far),
-        ("rays against the processor", 2, 0, 4.0, most_far),
-        ("rays against mesh", 2, 1, 1.0, 0.005),
+    for (what, a, b, most) in [
+        ("mesh against the processor", 1, 0, most),
+        ("rays against the processor", 2, 0, most),
+        ("rays against mesh", 2, 1, (1.0, 0.005)),
     ] {
         let (mean, far) = apart(&shown[a], &shown[b]);
         eprintln!("{name}, {what}: mean difference {mean:.2} of 255, {:.2} % of pixels far off", 100.0 * far);
-        assert!(mean < most && far < most_far, "{name}, {what}: {mean} of 255 in the mean, {far} of pixels far off");
+        assert!(mean < most.0 && far < most.1, "{name}, {what}: {mean} of 255 in the mean, {far} of pixels far off");
     }
 }
 
@@ -90,8 +91,27 @@ fn the_coast_looks_as_rays_see_it() {
         let stage = Stage::new(&scene);
         let mut painter = Painter::new(gpu.clone(), &stage).expect("a natural scene");
         for view in views {
-            compare(name, &stage, &mut painter, view, 0.02);
+            compare(name, &stage, &mut painter, None, view, (4.0, 0.02));
         }
+    }
+}
+
+#[test]
+fn waves_look_as_rays_see_them() {
+    let Some(gpu) = gpu() else { return };
+    let size = UVec2::new(256, 144);
+    let land = coast::coast();
+    let water = Water::flood(&land, 0.0).expect("a sea");
+    let shot = coast_shot(size);
+    let scene = Scene::for_shot(&land, Some(&water), &shot);
+    let stage = Stage::new(&scene);
+    let mut painter = Painter::new(gpu, &stage).expect("a natural scene");
+    let storm = SeaState::beaufort(8.0, 0.6).expect("a state");
+    for (name, state) in [("breeze", coast::sea_state()), ("storm", storm)] {
+        let mut sea = Sea::over(&land, &water, &state, &|_| true).expect("a sea");
+        sea.set_time(7.25);
+        painter.set_waves(Some(&sea)).expect("waves of tiles over a bed");
+        compare(name, &stage, &mut painter, Some(&sea), &shot.view, (6.0, 0.05));
     }
 }
 
@@ -147,5 +167,5 @@ fn a_block_with_missing_corners_looks_as_rays_see_it() {
     let scene = Scene { style: Style::Natural, border: Border::Cut, sun: Sun::new(4.2, 0.5), ..scene };
     let stage = Stage::new(&scene);
     let mut painter = Painter::new(gpu, &stage).expect("a natural scene");
-    compare("block", &stage, &mut painter, &view, 0.03);
+    compare("block", &stage, &mut painter, None, &view, (4.0, 0.03));
 }

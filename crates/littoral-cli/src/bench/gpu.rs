@@ -6,9 +6,9 @@ use super::mountains;
 use crate::ground::Reading;
 use crate::input::{self, WaterLevel};
 use crate::subject::Subject;
-use crate::talk::{Failure, Talk, progress, tidy};
+use crate::talk::{Failure, Talk, progress};
 use glam::{DVec2, DVec3, UVec2};
-use littoral::field::{HeightField, Lakes, Land, Water, coast};
+use littoral::field::{HeightField, Lakes, Land, Sea, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Patches};
 use littoral::picture::{self, Display, Exposure, Picture, Scene, Settings, Shot, Stage, Style};
 use littoral::space::{Datum, View};
@@ -45,14 +45,16 @@ const TRIANGLES: usize = 2_000_000;
 /// A pixel that differs by more steps of 255 in any channel is far off.
 const FAR: u8 = 24;
 
-/// Land and views of it.
+/// Land and views of it, with its waves or with still water.
 struct Place {
     name: String,
     land: Land,
     water: Option<Water>,
     lakes: Option<Lakes>,
+    /// The waves of those views that are to have some.
+    sea: Option<Sea>,
     shot: Shot,
-    views: Vec<(&'static str, View)>,
+    views: Vec<(&'static str, View, bool)>,
 }
 
 #[derive(Serialize)]
@@ -92,7 +94,7 @@ struct Row {
     frame_ms: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     frame_99_ms: Option<f64>,
-    /// Of the frame, by the adapter's clock (medians): how far away things are, and their light.
+    /// Of the frame, by the adapter's clock (medians): how far away the ground is, and the light of everything.
     #[serde(skip_serializing_if = "Option::is_none")]
     surface_ms: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -140,8 +142,11 @@ impl GpuBench {
             let mut painter = Painter::new(gpu.clone(), &stage).map_err(|e| Failure::Work(e.to_string()))?;
             let mut frames = Frames::new(&gpu, &stage)?;
             has_pass_times = frames.renderer.times.is_some();
-            for (name, view) in &place.views {
-                let rows = self.view(&stage, &mut painter, &mut frames, view, &mut sheet, &|| bar.inc(1))?;
+            for (name, view, waves) in &place.views {
+                let sea = place.sea.as_ref().filter(|_| *waves);
+                painter.set_waves(sea).map_err(|e| Failure::Work(e.to_string()))?;
+                frames.scenery.set_waves(&gpu, sea).map_err(|e| Failure::Work(e.to_string()))?;
+                let rows = self.view(&stage, sea, &mut painter, &mut frames, view, &mut sheet, &|| bar.inc(1))?;
                 views.push(Viewed { land: place.name.clone(), view: name, rows });
             }
         }
@@ -182,16 +187,22 @@ impl GpuBench {
             let Subject { name, land, water, lakes, .. } = subject;
             let shot = picture::compose(&land, water.as_ref(), size);
             let above = picture::overhead(&land, water.as_ref(), size).view;
-            let views = vec![("a view chosen by itself", shot.view), ("from above", above)];
-            return Ok(vec![Place { name, land, water, lakes, shot, views }]);
+            let views = vec![("a view chosen by itself", shot.view, false), ("from above", above, false)];
+            return Ok(vec![Place { name, land, water, lakes, sea: None, shot, views }]);
         }
         let land = coast::coast();
         let water = Water::flood(&land, 0.0);
         let shot = picture::coast_shot(size);
         let eye = shot.view.eye;
         let low = View::looking_at(eye, eye + DVec3::new(-300.0, 500.0, -60.0), 0.9, size);
-        let views = vec![("from its cliffs", shot.view), ("inland", low)];
-        let coast = Place { name: "the built-in coast".to_owned(), land, water, lakes: None, shot, views };
+        let views = vec![
+            ("from its cliffs", shot.view, false),
+            ("from its cliffs, with waves", shot.view, true),
+            ("over its bay", low, false),
+        ];
+        let sea = water.as_ref().map(|water| Sea::over(&land, water, &coast::sea_state(), &|_| true)).transpose();
+        let sea = sea.map_err(|e| Failure::Work(format!("the built-in coast: {e}")))?;
+        let coast = Place { name: "the built-in coast".to_owned(), land, water, lakes: None, sea, shot, views };
 
         let land = mountains(2049);
         let over = |at: DVec2, above: f64, down: f64| {
@@ -200,18 +211,20 @@ impl GpuBench {
             View::looking_at(eye, eye + DVec3::new(1.0, 1.0, -down), 1.0, size)
         };
         let views = vec![
-            ("50 m over the ground", over(DVec2::splat(0.1), 50.0, 0.1)),
-            ("3 km high", over(DVec2::splat(0.2), 3000.0, 1.0)),
+            ("50 m over the ground", over(DVec2::splat(0.1), 50.0, 0.1), false),
+            ("3 km high", over(DVec2::splat(0.2), 3000.0, 1.0), false),
         ];
         let name = "mountains of 30 × 30 km, 2049 × 2049 samples".to_owned();
-        let mountains = Place { name, land, water: None, lakes: None, shot, views };
+        let mountains = Place { name, land, water: None, lakes: None, sea: None, shot, views };
         Ok(vec![coast, mountains])
     }
 
     /// All ways to draw a view.
+    #[allow(clippy::too_many_arguments, reason = "what is drawn, by what, and who is told")]
     fn view(
         &self,
         stage: &Stage,
+        sea: Option<&Sea>,
         painter: &mut Painter,
         frames: &mut Frames,
         view: &View,
@@ -219,7 +232,7 @@ impl GpuBench {
         done: &dyn Fn(),
     ) -> Result<Vec<Row>, Failure> {
         let settings = Settings { samples: self.samples, ..Settings::default() };
-        let expected = stage.render(view, &settings, &|_| {});
+        let expected = stage.render_sea(sea, view, &settings, &|_| {});
         let how = Display { exposure: Exposure::Grey(expected.grey()), ..Display::default() };
         let expected = expected.display(&how);
         let against = |row: Row, picture: &Picture| {
@@ -228,11 +241,11 @@ impl GpuBench {
         };
         let once = Settings { samples: 1, ..settings };
         let times = self.times(&mut || {
-            stage.render(view, &once, &|_| {});
+            stage.render_sea(sea, view, &once, &|_| {});
             Ok([0.0; PassTimes::PASSES.len()])
         })?;
         let processor = times.row("processor, rays", false);
-        let again = stage.render(view, &Settings { seed: 1, ..settings }, &|_| {});
+        let again = stage.render_sea(sea, view, &Settings { seed: 1, ..settings }, &|_| {});
         let noise = against(Row { drawn_by: "processor, another seed", ..Row::default() }, &again);
         done();
 
@@ -377,7 +390,7 @@ impl Answer {
         let Adapter { name, kind, backend, driver, has_pass_times } = &self.adapter;
         let mut text = format!(
             "adapter: {name} ({kind}, {backend}{}{driver}); processor: {} threads\n\
-             {} x {} pixels; frames with one ray a pixel, wall clock until the work is done, still water; differences of pictures with {}, from the processor's:\n\
+             {} x {} pixels; frames with one ray a pixel, wall clock until the work is done; differences of pictures with {}, from the processor's:\n\
              mean of all channels in steps of 255, and pixels with more than {FAR} steps in any\n",
             if driver.is_empty() { "" } else { ", " },
             self.threads,
@@ -398,7 +411,8 @@ impl Answer {
                 "drawn by", "frame ms", "99 %", "choose ms", "triangles", "difference", "far"
             );
             for row in &viewed.rows {
-                let shown = |number: Option<f64>, decimals| number.map_or(String::new(), |n| tidy(n, decimals));
+                let shown =
+                    |number: Option<f64>, decimals: usize| number.map_or(String::new(), |n| format!("{n:.decimals$}"));
                 let passes = match has_pass_times {
                     true => format!(" {:>10} {:>10}", shown(row.surface_ms, 3), shown(row.shade_ms, 3)),
                     false => String::new(),
@@ -411,7 +425,7 @@ impl Answer {
                     shown(row.choose_ms, 1),
                     row.triangles.map_or(String::new(), |n| n.to_string()),
                     shown(row.mean_difference, 2),
-                    row.far_share.map_or(String::new(), |share| format!("{} %", tidy(100.0 * share, 2)))
+                    row.far_share.map_or(String::new(), |share| format!("{:.2} %", 100.0 * share))
                 );
             }
         }
