@@ -9,7 +9,7 @@
 //! as a whole number and a rest, so that nothing jitters far from the origin.
 //!
 //! **Against the processor.** Hits differ from those of [`Land::first_hit`] by less than 3·10⁻⁶ of the distances that are worked with (from the anchor to
-//! where the ray starts and ends) plus half a millimetre, measured along the steeper of ray and surface: what `f32` can tell. The pyramid is exact.
+//! where the ray starts and ends), 3·10⁻⁷ of the heights and half a millimetre, measured along the steeper of ray and surface: what `f32` can tell. The pyramid is exact.
 //!
 //! Works this rests on: spec page 004, "The height map as a shape texture" (2015), with A. Tevs et al., "Maximum mipmaps", I3D 2008. Ranges hold the samples
 //! on a node's border, too, so that they bound the bilinear surface.
