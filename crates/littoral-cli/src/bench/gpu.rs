@@ -187,7 +187,11 @@ impl GpuBench {
             let Subject { name, land, water, lakes, .. } = subject;
             let shot = picture::compose(&land, water.as_ref(), size);
             let above = picture::overhead(&land, water.as_ref(), size).view;
-            let views = vec![("a view chosen by itself", shot.view, false), ("from above", above, false)];
+            let mut views = vec![("a view chosen by itself", shot.view, false)];
+            // Of wide land that is the view chosen.
+            if above != shot.view {
+                views.push(("from above", above, false));
+            }
             return Ok(vec![Place { name, land, water, lakes, sea: None, shot, views }]);
         }
         let land = coast::coast();
