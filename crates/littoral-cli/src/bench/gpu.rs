@@ -10,7 +10,7 @@ use crate::talk::{Failure, Talk, progress};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::{HeightField, Lakes, Land, Sea, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Patches};
-use littoral::picture::{self, Display, Exposure, Picture, Scene, Settings, Shot, Stage, Style};
+use littoral::picture::{self, Display, Exposure, Picture, Scene, Settings, Shot, Stage};
 use littoral::space::{Cell, Datum, View};
 use littoral_gpu::{Gpu, GpuError, Ground, Look, Painter, PassTimes, Renderer, Scenery, ShapeTexture, Triangles};
 use serde::Serialize;
@@ -135,7 +135,6 @@ impl GpuBench {
         for place in &places {
             let scene = Scene {
                 lakes: place.lakes.as_ref(),
-                style: Style::Natural,
                 ..Scene::for_shot(&place.land, place.water.as_ref(), &place.shot)
             };
             let stage = Stage::new(&scene);
@@ -340,7 +339,7 @@ impl Frames {
     fn new(gpu: &Gpu, stage: &Stage) -> Result<Frames, Failure> {
         let failed = |e: &dyn std::fmt::Display| Failure::Work(e.to_string());
         let (Some(tables), Datum::Plane { origin, size }) = (stage.tables(), stage.land().datum()) else {
-            return Err(Failure::Work("expected land in natural colours on a plane, got another".into()));
+            return Err(Failure::Work("expected land on a plane in colours, got another".into()));
         };
         let height = f64::from(stage.land().height_range().high).max(2.0);
         let scenery = Scenery::new(gpu, &tables, (origin, size), (height, &stage.sky_table(height)));
