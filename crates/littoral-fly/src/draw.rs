@@ -7,7 +7,7 @@ use glam::UVec2;
 use littoral::field::HeightField;
 use littoral::picture::Stage;
 use littoral::space::{Datum, View};
-use littoral_gpu::{Ground, Gpu, Look, Triangles};
+use littoral_gpu::{Gpu, Ground, Look, Triangles};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A land and its light, ready to be drawn.
