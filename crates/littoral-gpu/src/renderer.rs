@@ -54,7 +54,6 @@ pub enum Ground<'a> {
 #[derive(Debug)]
 struct Canvas {
     size: UVec2,
-    ground: wgpu::Texture,
     depth: wgpu::TextureView,
     radiance: wgpu::Texture,
     /// Of no size where no waves were drawn yet.
@@ -217,10 +216,9 @@ impl Renderer {
                     view_formats: &[],
                 })
             };
-            let ground = make("depth", DEPTH, wgpu::TextureUsages::COPY_SRC);
-            let depth = ground.create_view(&Default::default());
+            let depth = make("depth", DEPTH, wgpu::TextureUsages::empty()).create_view(&Default::default());
             let radiance = make("radiance", RADIANCE, wgpu::TextureUsages::COPY_SRC);
-            Canvas { size, ground, depth, radiance, wet: Wet::new(gpu, UVec2::ONE, DEPTH) }
+            Canvas { size, depth, radiance, wet: Wet::new(gpu, UVec2::ONE, DEPTH) }
         }))
     }
 
@@ -272,7 +270,7 @@ impl Renderer {
                 canvas.wet = Wet::new(gpu, size, DEPTH);
             }
             let passes = self.waves.get_or_insert_with(|| WavePass::new(gpu, DEPTH));
-            passes.draw(gpu, encoder, &self.uniforms, waves, scenery.land, view, &canvas.ground, &canvas.wet);
+            passes.draw(gpu, encoder, &self.uniforms, waves, scenery.land, view, &canvas.depth, &canvas.wet);
         }
 
         let radiance = canvas.radiance.create_view(&Default::default());

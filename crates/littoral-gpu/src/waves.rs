@@ -1,7 +1,7 @@
 //! The waves of a scenery: a sea of the engine on the device, the grid that it is drawn on, and the passes that find where it is seen and what it is like there.
 //!
 //! 1. In compute, the points of a grid ([`grid`]) go where their water is at the instant.
-//! 2. As triangles they cover, nearest first, what of the water is before the ground; every pixel of it works out slopes, hidden slopes and foam where its
+//! 2. As triangles they cover, nearest first, what of the water may be before the ground; every pixel of it works out slopes, hidden slopes and foam where its
 //!    water rests, which the triangles tell: nothing is searched for.
 //!
 //! Light falls on it in the pass that shades everything else.
@@ -167,7 +167,7 @@ impl Waves {
 /// What is known of the sea in each pixel of a canvas.
 #[derive(Debug)]
 pub(crate) struct Wet {
-    /// As far away as the nearest of ground and sea.
+    /// As far away as the sea.
     pub depth: wgpu::Texture,
     /// What `wave_seen.wgsl` tells.
     pub seen: wgpu::Texture,
@@ -189,7 +189,7 @@ impl Wet {
             })
         };
         Wet {
-            depth: make("depth with the sea", depth, wgpu::TextureUsages::COPY_DST),
+            depth: make("depth of the sea", depth, wgpu::TextureUsages::empty()),
             seen: make("sea seen", wgpu::TextureFormat::Rgba32Uint, wgpu::TextureUsages::empty()),
         }
     }
@@ -278,7 +278,7 @@ impl WavePass {
         WavePass { move_points, seen, grid, radii: None, points: None, drawn: None }
     }
 
-    /// Records the passes that find the sea before the ground, whose depth a canvas has. `land` is the land's rectangle (m).
+    /// Records the passes that find the sea, given how far the ground is. `land` is the land's rectangle (m).
     #[allow(clippy::too_many_arguments, reason = "what a frame is made of")]
     pub fn draw(
         &mut self,
@@ -288,7 +288,7 @@ impl WavePass {
         waves: &Waves,
         land: (DVec2, DVec2),
         view: &View,
-        ground: &wgpu::Texture,
+        ground: &wgpu::TextureView,
         wet: &Wet,
     ) {
         let eye = view.eye.truncate();
@@ -300,7 +300,7 @@ impl WavePass {
             if let Some(grid) = WaveGrid::of(view, waves.level, &waves.bounds, border) {
                 let size = self.set_grid(gpu, &grid);
                 self.drawn = Some((*view, waves.instant, size));
-                let bound = self.bind(gpu, uniforms, true);
+                let bound = self.bind(gpu, uniforms, None);
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("wave points"),
                     timestamp_writes: None,
@@ -313,9 +313,8 @@ impl WavePass {
                 pass.dispatch_workgroups(size[0].div_ceil(64), size[1], 1);
             }
         }
-        encoder.copy_texture_to_texture(ground.as_image_copy(), wet.depth.as_image_copy(), ground.size());
-        let Some((_, _, [columns, rings])) = self.drawn else { return };
-        let bound = self.bind(gpu, uniforms, false);
+        let size = self.drawn.map_or([0, 0], |drawn| drawn.2);
+        let bound = self.bind(gpu, uniforms, Some(ground));
         let (seen, depth) = (wet.seen.create_view(&Default::default()), wet.depth.create_view(&Default::default()));
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("waves"),
@@ -330,16 +329,19 @@ impl WavePass {
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &depth,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store }),
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             }),
             ..Default::default()
         });
+        if size[1] < 2 {
+            return;
+        }
         pass.set_pipeline(&self.seen);
         for (number, group) in bound.iter().chain([waves.tiles.sample_group(), waves.shore.group()]).enumerate() {
             pass.set_bind_group(number as u32, group, &[]);
         }
-        pass.draw(0..2 * columns, 0..rings - 1);
+        pass.draw(0..2 * size[0], 0..size[1] - 1);
     }
 
     /// Tells shaders a grid, and makes room for its points. How many they are: a ring, rings.
@@ -367,19 +369,33 @@ impl WavePass {
         size
     }
 
-    fn bind(&self, gpu: &Gpu, uniforms: &wgpu::Buffer, writes: bool) -> Option<wgpu::BindGroup> {
+    /// What the pass over pixels is bound to, given how far the ground is; else what the points' is.
+    fn bind(&self, gpu: &Gpu, uniforms: &wgpu::Buffer, ground: Option<&wgpu::TextureView>) -> Option<wgpu::BindGroup> {
         let (radii, points) = (self.radii.as_ref()?, self.points.as_ref()?);
-        let buffers = [uniforms, &self.grid, radii, points].map(|buffer| buffer.as_entire_binding());
-        Some(sea::group(&gpu.device, &own_layout(&gpu.device, writes), buffers))
+        let [a, b, c, d] = [uniforms, &self.grid, radii, points].map(|buffer| buffer.as_entire_binding());
+        let layout = own_layout(&gpu.device, ground.is_none());
+        Some(match ground {
+            Some(view) => sea::group(&gpu.device, &layout, [a, b, c, d, wgpu::BindingResource::TextureView(view)]),
+            None => sea::group(&gpu.device, &layout, [a, b, c, d]),
+        })
     }
 }
 
-/// Frame, grid, radii and points.
+/// Frame, grid, radii and points, to be written or to be drawn; then also how far the ground is.
 fn own_layout(device: &wgpu::Device, writes: bool) -> wgpu::BindGroupLayout {
     let uniform = || sea::buffer(wgpu::BufferBindingType::Uniform, false);
     let storage = |read_only| sea::buffer(wgpu::BufferBindingType::Storage { read_only }, false);
-    let stages = if writes { wgpu::ShaderStages::COMPUTE } else { wgpu::ShaderStages::VERTEX_FRAGMENT };
-    sea::group_layout(device, stages, [uniform(), uniform(), storage(true), storage(!writes)])
+    if writes {
+        let types = [uniform(), uniform(), storage(true), storage(false)];
+        return sea::group_layout(device, wgpu::ShaderStages::COMPUTE, types);
+    }
+    let depth = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Depth,
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    let types = [uniform(), uniform(), storage(true), storage(true), depth];
+    sea::group_layout(device, wgpu::ShaderStages::VERTEX_FRAGMENT, types)
 }
 
 #[cfg(test)]

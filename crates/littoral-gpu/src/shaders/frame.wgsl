@@ -73,6 +73,8 @@ struct Frame {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
+// Water up to this much farther away than the drawn ground may be seen all the same.
+const NEARLY = 1.25;
 const PI = 3.14159265;
 // Radius of the Earth (m).
 const EARTH = 6371000.0;

@@ -1,7 +1,7 @@
 // Every pixel lit once: from how far away things are to the light they send. The engine's `picture::shade`.
 
 @group(0) @binding(15) var depth_map: texture_depth_2d;
-// The same with the sea before the ground, and what its waves are like there: see wave_seen.wgsl.
+// As far as the sea is, and what its waves are like there: see wave_seen.wgsl.
 @group(0) @binding(18) var sea_depth_map: texture_depth_2d;
 @group(0) @binding(19) var sea_map: texture_2d<u32>;
 
@@ -126,6 +126,13 @@ fn random_of(pixel: vec2f) -> vec2f {
     return r * vec2f(cos(2.0 * PI * v), sin(2.0 * PI * v));
 }
 
+// Whether water of a level over the sea (m) at a place is seen, and not the ground, which is at another place: the drawn ground tells which is nearer, but where they are
+// near each other it is off by more than the depth of the water, and from far away distances are too coarse. There the data tell.
+fn is_water_before(nearer: bool, nearly: bool, at: vec2f, ground: vec2f, level: f32) -> bool {
+    let submerged = !is_within(sample_of(at)) || mean_of(sample_of(at), 0u) <= level;
+    return submerged && (nearer || nearly && is_within(sample_of(ground)) && mean_of(sample_of(ground), 0u) <= level);
+}
+
 struct Water {
     ripples: Ripples,
     // How much of it is foam, and where the water rests, from the eye (m).
@@ -212,7 +219,8 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let sea = textureLoad(sea_depth_map, vec2i(position.xy), 0);
         let at = across * (frame.corner.w / max(sea, 1e-12));
         let held = !has_block() || all(at.xy >= frame.block.xy) && all(at.xy <= frame.block.zw);
-        if sea > depth && held && may_be_wet(at.xy) {
+        let level = at.z + frame.eye.z;
+        if sea > 0.0 && held && may_be_wet(at.xy) && is_water_before(sea >= depth, sea * NEARLY >= depth, at.xy, rel.xy, level) {
             waving = true;
             is_water = true;
             rel = at;
@@ -226,8 +234,7 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
         if any(at < frame.land.xy) || any(at > frame.land.zw) {
             t = select(curved(rise, direction), -1.0, has_block());
         }
-        // From far away distances are too coarse to tell water from ground beside it, heights are not.
-        let is_before = t <= distance * (1.0 + 1e-6) || (t > 1e5 && mean_of(sample_of(direction.xy * t), 0u) <= frame.eye.z + frame.water.x);
+        let is_before = is_water_before(t <= distance * (1.0 + 1e-6), t <= distance * NEARLY, direction.xy * t, rel.xy, frame.water.x + frame.eye.z);
         if t > 0.0 && is_before && covers(direction.xy * t) {
             is_water = true;
             distance = t;

@@ -1,6 +1,9 @@
-// The sea as far as it is before the ground, and what its waves are like in every pixel: the engine's `picture::waves`.
+// How far the sea is, and what its waves are like in every pixel: the engine's `picture::waves`.
 
 @group(0) @binding(3) var<storage, read> points: array<vec4f>;
+
+// As far as the drawn ground is.
+@group(0) @binding(4) var depth_map: texture_depth_2d;
 
 struct Seen {
     @builtin(position) position: vec4f,
@@ -25,6 +28,9 @@ const NOISE = 0.5;
 // Slope; covariances of the slopes that the pixel cannot show; foam; displacement (m): as halves, covariances 64 times as large.
 @fragment
 fn wet(seen: Seen) -> @location(0) vec4u {
+    if seen.position.z * NEARLY < textureLoad(depth_map, vec2i(seen.position.xy), 0) {
+        return vec4u(0u); // behind the ground
+    }
     let distance = length(seen.rel);
     let footprint = footprint_of(distance, -seen.rel.z / distance);
     let surface = waves_surface(seen.rest, footprint);
