@@ -1,6 +1,6 @@
 //! `littoral render`: pictures and films.
 
-use crate::detail::{Detail, Method, Told};
+use crate::detail::{Detail, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
@@ -10,6 +10,7 @@ use crate::waves::state as sea;
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::{Sea, coast};
+use littoral::lod::Method;
 use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
 use littoral::space::{Ray, View};
 use littoral::waves::SeaState;

@@ -1,8 +1,7 @@
 //! A method at work over one land, frame after frame.
 
-use crate::settings::Method;
 use littoral::field::{HeightField, Land, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, NestedBounds, Reached, RoamFlight, ViewError};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Reached, RoamFlight, ViewError};
 use littoral::space::{Datum, View};
 use std::cell::OnceCell;
 

@@ -4,10 +4,11 @@ use crate::camera::Mode;
 use crate::cockpit::{Cockpit, median};
 use crate::keys;
 use crate::plots;
-use crate::settings::{Method, Show, Style};
+use crate::settings::{Show, Style};
 use egui::{Align2, Color32, DragValue, RichText, Slider, TextEdit, Ui};
 use glam::{DVec3, UVec2, Vec2};
 use littoral::flight::{Interpolation, Level, Pace};
+use littoral::lod::Method;
 use std::path::Path;
 
 /// What the panel asks of the window.
@@ -111,7 +112,7 @@ fn status(ui: &mut Ui, cockpit: &Cockpit) {
             let milliseconds = median(history.frame.iter().rev().take(12).copied());
             ui.label(format!("{:.0} frames/s", if milliseconds > 0.0 { 1000.0 / milliseconds } else { 0.0 }));
             if let Some(frame) = &cockpit.frame {
-                ui.label(format!("{} in {:.1} ms", cockpit.settings.method.words().0, frame.milliseconds));
+                ui.label(format!("{} in {:.1} ms", cockpit.settings.method, frame.milliseconds));
                 ui.label(format!("{} triangles", thousands(frame.triangles())));
                 for (what, reached) in [("ground", Some(frame.ground_reached)), ("sea", frame.water_reached)] {
                     let Some(reached) = reached else { continue };
@@ -186,14 +187,13 @@ fn detail(ui: &mut Ui, cockpit: &mut Cockpit, asks: &mut Vec<Ask>) {
     section(ui, "Detail", true, |ui| {
         let settings = &mut cockpit.settings;
         let mut method = settings.method;
-        egui::ComboBox::from_id_salt("method").selected_text(method.words().0).show_ui(ui, |ui| {
+        egui::ComboBox::from_id_salt("method").selected_text(method.name()).show_ui(ui, |ui| {
             for each in Method::ALL {
-                let (name, does) = each.words();
-                ui.selectable_value(&mut method, each, name).on_hover_text(does);
+                ui.selectable_value(&mut method, each, each.name()).on_hover_text(each.description());
             }
         });
         settings.method = method;
-        ui.label(RichText::new(method.words().1).weak().small());
+        ui.label(RichText::new(method.description()).weak().small());
         let tolerance = Slider::new(&mut settings.tolerance_pixels, 0.1..=50.0).logarithmic(true);
         ui.add(tolerance.custom_formatter(|n, _| format!("{n:.2}")).text("px tolerance"));
         ui.add(Slider::new(&mut settings.triangles, 1000..=5_000_000).logarithmic(true).text("most triangles"));

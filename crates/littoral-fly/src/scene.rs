@@ -8,11 +8,10 @@
 use crate::chooser::Chooser;
 use crate::draw::Scenery;
 use crate::plain::sea_datum;
-use crate::settings::Method;
 use crate::subject::{Order, Subject};
 use glam::{DVec2, UVec2};
 use littoral::field::Sea;
-use littoral::lod::{Mesh, NestedBounds, Reached};
+use littoral::lod::{Mesh, Method, NestedBounds, Reached};
 use littoral::picture::{self, Air, Border, Climate, Scene, Shot, Stage, Sun};
 use littoral::space::View;
 use littoral::waves::SeaState;

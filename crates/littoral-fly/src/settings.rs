@@ -1,60 +1,9 @@
 //! What is remembered from one flight to the next: a readable file in the user's folder for settings.
 
 use crate::camera::Mode;
-use littoral::lod::{Limits, Lod, Nested, Patches, Quadtree, Roam, Strips, Whole};
+use littoral::lod::Method;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-
-/// A method of detail.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Everything equally fine.
-    Whole,
-    /// Nested square windows.
-    Nested,
-    /// A restricted quadtree whose patches morph.
-    #[default]
-    Quadtree,
-    /// Triangles cut level by level.
-    Patches,
-    /// Strips along rows.
-    Strips,
-    /// A bintree of right triangles, which goes on from frame to frame.
-    Roam,
-}
-
-impl Method {
-    /// All of them.
-    pub const ALL: [Method; 6] =
-        [Method::Whole, Method::Nested, Method::Quadtree, Method::Patches, Method::Strips, Method::Roam];
-
-    /// What it is called, and what it does.
-    pub fn words(self) -> (&'static str, &'static str) {
-        match self {
-            Method::Whole => ("Whole", "Everything equally fine: what the others are measured by"),
-            Method::Nested => ("Nested", "Square windows within each other, joined by upright strips: for seas"),
-            Method::Quadtree => ("Quadtree", "A restricted quadtree whose patches morph"),
-            Method::Patches => ("Patches", "Triangles cut level by level, edges deciding"),
-            Method::Strips => ("Strips", "Strips along rows whose cells change size on the way"),
-            Method::Roam => {
-                ("ROAM", "A bintree of right triangles, the worst split first; it goes on from frame to frame")
-            }
-        }
-    }
-
-    /// The method within limits.
-    pub fn within(self, limits: Limits) -> Box<dyn Lod> {
-        match self {
-            Method::Whole => Box::new(Whole::new(limits)),
-            Method::Nested => Box::new(Nested::new(limits)),
-            Method::Quadtree => Box::new(Quadtree::new(limits)),
-            Method::Patches => Box::new(Patches::new(limits)),
-            Method::Strips => Box::new(Strips::new(limits)),
-            Method::Roam => Box::new(Roam::new(limits)),
-        }
-    }
-}
 
 /// How the picture is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -118,6 +67,7 @@ pub struct Settings {
     /// Of the file's format.
     pub version: u32,
     /// How triangles are chosen.
+    #[serde(with = "by_name")]
     pub method: Method,
     /// How far from its place the mesh may be drawn (pixels).
     pub tolerance_pixels: f64,
@@ -155,6 +105,20 @@ pub struct Settings {
     pub panel: bool,
 }
 
+/// Methods are saved by their names.
+mod by_name {
+    use littoral::lod::Method;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub fn serialize<S: Serializer>(method: &Method, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(method.name())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Method, D::Error> {
+        String::deserialize(from)?.parse().map_err(D::Error::custom)
+    }
+}
+
 /// The newest version of the file.
 const VERSION: u32 = 1;
 
@@ -162,7 +126,7 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             version: VERSION,
-            method: Method::default(),
+            method: Method::Quadtree,
             tolerance_pixels: 1.0,
             triangles: 150_000,
             style: Style::default(),

@@ -289,7 +289,7 @@ impl Flight {
                 frames: smoke.frames,
                 width: size.x,
                 height: size.y,
-                method: self.cockpit.settings.method.words().0,
+                method: self.cockpit.settings.method.name(),
                 frame_ms: median(smoke.milliseconds.iter().copied()),
                 method_ms: median(smoke.method.iter().copied()),
                 triangles: median(smoke.triangles.iter().copied()),
@@ -374,7 +374,8 @@ impl Flight {
             return;
         }
         use crate::camera::Mode;
-        use crate::settings::{Method, Show, Style};
+        use crate::settings::{Show, Style};
+        use littoral::lod::Method;
         let settings = &mut cockpit.settings;
         match key {
             KeyCode::F1 => self.shown.help = !self.shown.help,
