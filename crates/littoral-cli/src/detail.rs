@@ -100,7 +100,7 @@ impl Detail {
     }
 
     /// The graphics card made ready for a stage, if it is to draw.
-    pub fn painter(&self, stage: &Stage, talk: &mut Talk) -> Result<Option<Painter>, Failure> {
+    pub fn painter(&self, stage: &Stage, sea: Option<&Sea>, talk: &mut Talk) -> Result<Option<Painter>, Failure> {
         if !self.gpu {
             return Ok(None);
         }
@@ -109,7 +109,9 @@ impl Detail {
         if gpu.is_software() {
             talk.note(format!("no graphics card: {} stands for one", gpu.adapter.name));
         }
-        Painter::new(gpu, stage).map(Some).map_err(failed)
+        let mut painter = Painter::new(gpu, stage).map_err(failed)?;
+        painter.set_waves(sea).map_err(failed)?;
+        Ok(Some(painter))
     }
 
     /// The view that the mesh is chosen for: the picture's, or another eye's on the same point.
@@ -140,6 +142,8 @@ impl Chooser<'_> {
             }
             None => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
         };
+        // The graphics card has triangles of its own for the sea.
+        let sea = sea.filter(|_| !self.detail.gpu);
         self.shows_water = sea.is_some();
         if let Some(sea) = sea {
             // No cell of water is smaller than this (m).
@@ -175,6 +179,9 @@ impl Chooser<'_> {
         let Some(mut painter) = self.painter.take() else {
             return Ok(stage.render_meshes(&self.meshes(), sea, view, settings, told));
         };
+        if let Some(sea) = sea {
+            painter.follow_waves(sea);
+        }
         let ground = self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh);
         let painted = painter.picture(stage, ground, view, settings.samples, &|done| told(done));
         self.painter = Some(painter);

@@ -307,14 +307,14 @@ impl Cockpit {
         }
     }
 
-    /// Whether waves are drawn.
+    /// Whether waves are wanted as triangles: natural pictures make them of the sea itself.
     fn shows_waves(&self) -> bool {
         self.settings.style == Style::Plain
     }
 
-    /// The instant of the sea that is wished for (s): a sea that is neither seen nor felt stands still.
+    /// The instant of the sea that is wished for (s): still water has but one.
     pub fn sea_time(&self) -> f64 {
-        if self.shows_waves() || self.camera.mode() == Mode::Boat { self.time } else { 0.0 }
+        if self.settings.waves { self.time } else { 0.0 }
     }
 
     /// What is wished for, in a picture of this size.

@@ -171,7 +171,7 @@ impl Compare {
     }
 }
 
-/// A texture to be drawn to, and read by shaders.
+/// A texture to be drawn to, copied, and read by shaders.
 pub fn canvas(gpu: &Gpu, label: &str, format: wgpu::TextureFormat, size: UVec2) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
@@ -180,7 +180,10 @@ pub fn canvas(gpu: &Gpu, label: &str, format: wgpu::TextureFormat, size: UVec2) 
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_DST
+            | wgpu::TextureUsages::COPY_SRC,
         view_formats: &[],
     })
 }
@@ -216,8 +219,57 @@ pub fn everywhere(
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
+    use crate::paint::pixels;
+
+    pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+    /// A device, if there is one.
+    pub fn device() -> Option<Gpu> {
+        Gpu::headless().inspect_err(|problem| println!("untested without a device: {problem}")).ok()
+    }
+
+    /// Writes into a texture what a function says of each pixel.
+    pub fn fill(gpu: &Gpu, texture: &wgpu::Texture, colour: impl Fn(UVec2) -> [u8; 3]) {
+        let (width, height) = (texture.width(), texture.height());
+        let pixel = |i: u32| colour(UVec2::new(i % width, i / width));
+        let bytes: Vec<u8> = (0..width * height).flat_map(|i| [pixel(i).as_slice(), &[255]].concat()).collect();
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: None };
+        gpu.queue.write_texture(texture.as_image_copy(), &bytes, layout, texture.size());
+    }
+
+    #[test]
+    fn two_pictures_are_shown_and_measured() {
+        let Some(gpu) = device() else { return };
+        let size = UVec2::new(70, 33);
+        let mut compare = Compare::new(&gpu, FORMAT);
+        let _ = compare.pictures(&gpu, size);
+        let [first, second] = compare.pictures.as_ref().expect("made");
+        let colour = |at: UVec2| [(at.x * 3) as u8, (at.y * 7) as u8, 40];
+        // One pixel in the last, partly filled tile is far off, a column slightly.
+        let other = |at: UVec2| match (at.x, at.y) {
+            (69, 32) => [(69 * 3) as u8, 32 * 7, 140],
+            (5, y) => [5 * 3, (y * 7) as u8, 44],
+            _ => colour(at),
+        };
+        fill(&gpu, first, colour);
+        fill(&gpu, second, other);
+        let target = canvas(&gpu, "target", FORMAT, size);
+        let view = target.create_view(&Default::default());
+        compare.show(&gpu, Shown::Halves(20.0), &view);
+        let shown = pixels(&gpu, &target).expect("read");
+        assert_eq!(shown[5], colour(UVec2::new(5, 0)), "the first on the left");
+        assert_eq!(shown[20], [255; 3], "the line between them");
+        assert_eq!(shown[70 * 33 - 1], other(size - 1), "the second on the right");
+        compare.show(&gpu, Shown::Difference(8.0), &view);
+        let shown = pixels(&gpu, &target).expect("read");
+        assert_eq!((shown[0], shown[5], shown[70 * 33 - 1]), ([0; 3], [0, 0, 32], [0, 0, 255]));
+        let pixels = f64::from(size.element_product());
+        let Difference { mean, largest, off } = compare.difference.expect("read back with the pictures");
+        assert!((mean - (33.0 * 4.0 + 100.0) / 3.0 / pixels).abs() < 1e-9, "{mean}");
+        assert!(largest == 100 && (off - 1.0 / pixels).abs() < 1e-12, "{largest}, {off}");
+    }
 
     #[test]
     fn tiles_add_up() {

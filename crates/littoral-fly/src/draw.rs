@@ -6,7 +6,7 @@ use crate::rest::{self, Gathered, Gatherer};
 use crate::scene::{Choice, Frame};
 use crate::settings::{Settings, Show, Split, Style};
 use glam::{Mat4, UVec2, Vec2};
-use littoral::field::HeightField;
+use littoral::field::{HeightField, Sea};
 use littoral::picture::Stage;
 use littoral::space::{Datum, View};
 use littoral_gpu::{Gpu, Look, Triangles};
@@ -43,6 +43,22 @@ impl Scenery {
     /// Which scenery it is, and in which state.
     fn state(&self) -> (usize, u64) {
         (Arc::as_ptr(&self.plain) as usize, self.changes.load(Ordering::Relaxed))
+    }
+
+    /// Draws the waves of a sea from now on, or still water. What cannot be drawn lies still; the sentence says why.
+    pub fn set_waves(&self, gpu: &Gpu, sea: Option<&Sea>) -> Result<(), String> {
+        let Some(full) = &self.full else { return Ok(()) };
+        let set = full.lock().unwrap_or_else(PoisonError::into_inner).set_waves(gpu, sea);
+        self.changes.fetch_add(1, Ordering::Relaxed);
+        set.map_err(|e| format!("{e}; natural pictures show still water"))
+    }
+
+    /// Goes on to the instant at which the sea of [`Scenery::set_waves`] stands now.
+    pub fn follow_waves(&self, gpu: &Gpu, sea: &Sea) {
+        if let Some(full) = &self.full {
+            full.lock().unwrap_or_else(PoisonError::into_inner).follow_waves(gpu, sea);
+            self.changes.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// Brings the sky as it is seen from a height (m), if it is another one. The lock is held while it is copied, not while it is made.
@@ -122,7 +138,8 @@ impl Rest {
             view: seen.view,
             frame: (seen.frame.serial, seen.frame.number),
             scenery: seen.scenery.state(),
-            settings: seen.settings.clone(),
+            // Neither the panel nor the gain changes what is looked at.
+            settings: Settings { panel: true, gain: 1.0, ..seen.settings.clone() },
         };
         /// An exposure that is this near is the same.
         const ALIKE: f32 = 0.015;

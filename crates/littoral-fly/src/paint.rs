@@ -148,7 +148,7 @@ impl Paint {
         if let Some(gui) = gui {
             self.over(gui, &target);
         }
-        self.pixels(&texture)
+        pixels(&self.gpu, &texture)
     }
 
     /// What is to be seen, as soon as there is something.
@@ -187,32 +187,29 @@ impl Paint {
         commands.push(encoder.finish());
         queue.submit(commands);
     }
+}
 
-    /// What a texture holds.
-    fn pixels(&self, texture: &wgpu::Texture) -> Result<Vec<[u8; 3]>, String> {
-        let size = texture.size();
-        let row = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("copy"),
-            size: u64::from(row) * u64::from(size.height),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let layout =
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(size.height) };
-        let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-        encoder.copy_texture_to_buffer(texture.as_image_copy(), into, size);
-        self.gpu.queue.submit([encoder.finish()]);
-        buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-        let problem =
-            |e: &dyn std::fmt::Display| format!("the picture could not be read back from the graphics card: {e}");
-        self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| problem(&e))?;
-        let bytes = buffer.slice(..).get_mapped_range().map_err(|e| problem(&e))?;
-        let blue_first =
-            matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
-        let colour = |p: &[u8]| if blue_first { [p[2], p[1], p[0]] } else { [p[0], p[1], p[2]] };
-        let lines = bytes.chunks_exact(row as usize);
-        Ok(lines.flat_map(|line| line[..4 * size.width as usize].chunks_exact(4).map(colour)).collect())
-    }
+/// What a texture holds: red, green and blue, row by row.
+pub fn pixels(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<[u8; 3]>, String> {
+    let size = texture.size();
+    let row = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("copy"),
+        size: u64::from(row) * u64::from(size.height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(size.height) };
+    let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), into, size);
+    gpu.queue.submit([encoder.finish()]);
+    buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    let problem = |e: &dyn std::fmt::Display| format!("the picture could not be read back from the graphics card: {e}");
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| problem(&e))?;
+    let bytes = buffer.slice(..).get_mapped_range().map_err(|e| problem(&e))?;
+    let blue_first = matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
+    let colour = |p: &[u8]| if blue_first { [p[2], p[1], p[0]] } else { [p[0], p[1], p[2]] };
+    let lines = bytes.chunks_exact(row as usize);
+    Ok(lines.flat_map(|line| line[..4 * size.width as usize].chunks_exact(4).map(colour)).collect())
 }

@@ -76,7 +76,10 @@ fn divider(ui: &Ui, cockpit: &mut Cockpit) {
         let colour = if response.hovered() || response.dragged() { Color32::WHITE } else { Color32::from_gray(200) };
         ui.painter().rect_filled(rect, 6.0, Color32::from_black_alpha(160));
         let font = egui::FontId::proportional(16.0);
-        ui.painter().text(rect.center(), Align2::CENTER_CENTER, "↔", font.clone(), colour);
+        for x in [-3.0, 0.0, 3.0] {
+            let at = rect.center() + egui::vec2(x, 0.0);
+            ui.painter().vline(at.x, at.y - 10.0..=at.y + 10.0, egui::Stroke::new(1.0, colour));
+        }
         if let Some((first, Some(second))) = names {
             let painter = ui.ctx().layer_painter(egui::LayerId::background());
             for (name, at, align) in [(first, -14.0, Align2::RIGHT_TOP), (second, 14.0, Align2::LEFT_TOP)] {
@@ -429,8 +432,8 @@ fn sea(ui: &mut Ui, cockpit: &mut Cockpit) {
                 ui.checkbox(&mut cockpit.still, "stand still");
             });
             ui.label(RichText::new(format!("at {:.1} s", cockpit.time)).weak());
-            if cockpit.settings.style == Style::Natural {
-                let words = "Waves carry the boat; they are seen in plain pictures only (Detail).";
+            if !cockpit.still && cockpit.settings.style == Style::Natural {
+                let words = "Pictures get clean at rest while the sea stands still (Space).";
                 ui.label(RichText::new(words).weak().small());
             }
         });

@@ -159,6 +159,8 @@ impl Gatherer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::compare::tests::{FORMAT, device, fill};
+    use crate::paint::pixels;
     use glam::DVec3;
 
     #[test]
@@ -191,6 +193,35 @@ mod tests {
                 }
             }
             assert_eq!(seen.len(), 3, "{coarse}: each of them once a round");
+        }
+    }
+
+    #[test]
+    fn coarse_looks_become_a_sharp_picture() {
+        let Some(gpu) = device() else { return };
+        let gatherer = Gatherer::new(&gpu, FORMAT);
+        for (coarse, size) in [(1, UVec2::new(17, 9)), (4, UVec2::new(43, 22))] {
+            // Every pixel of the window has its own colour.
+            let scene = |at: UVec2| [(at.x * 5) as u8, (at.y * 11) as u8, ((at.x + at.y) % 2 * 200) as u8];
+            let (shift, cells) = (margin(size, coarse).0, size.map(|side| side.div_ceil(coarse)));
+            let mut gathered = Gathered::default();
+            let target = canvas(&gpu, "target", FORMAT, size);
+            let view = target.create_view(&Default::default());
+            for number in 0..=coarse * coarse {
+                let part = (number > 0).then(|| part(number, size, coarse));
+                let through = part.map_or(UVec2::ZERO, |part| part.part);
+                let _ = gatherer.look(&gpu, &mut gathered, cells);
+                let seen = |cell: UVec2| scene((cell * coarse + through).max(shift) - shift);
+                fill(&gpu, gathered.look.as_ref().expect("made"), seen);
+                gatherer.gather(&gpu, &mut gathered, part, size, coarse);
+            }
+            gatherer.show(&gpu, &gathered, &view);
+            let shown = pixels(&gpu, &target).expect("read");
+            for (i, shown) in shown.iter().enumerate() {
+                let at = UVec2::new(i as u32 % size.x, i as u32 / size.x);
+                let off = (0..3).map(|c| shown[c].abs_diff(scene(at)[c])).max();
+                assert!(off <= Some(1), "{coarse}: {at}: {shown:?} for {:?}", scene(at));
+            }
         }
     }
 

@@ -306,6 +306,8 @@ fn fly(
             let mut first = Chooser::new(stage.land(), &bounds, wish.first);
             let mut second: Option<Chooser> = None;
             let mut answered: Option<Wish> = None;
+            // Which waves natural pictures show: whether any, and of which instant (s).
+            let mut seen = (false, f64::NAN);
             loop {
                 if wish.look != look {
                     break;
@@ -335,7 +337,7 @@ fn fly(
                             "the waves could not be made (an internal error; please report it)".into(),
                         )),
                     }
-                    answered = None;
+                    (answered, seen) = (None, (false, f64::NAN));
                 }
                 // A sky takes long: no more than a quarter of the time is spent on skies.
                 if sky.1.elapsed() > 3 * sky.0 {
@@ -353,7 +355,11 @@ fn fly(
                     let sea = waves.as_mut().or(still.as_mut()).filter(|_| stage.shows_waves());
                     number += 1;
                     let grey = meter.grey(&stage, &wish.eye);
-                    match frame(&mut first, second.as_mut(), sea, wish) {
+                    let made = frame(&mut first, second.as_mut(), sea, wish);
+                    if let Err(problem) = show_waves(&scenery, gpu, waves.as_ref(), &mut seen) {
+                        voice.tell(News::Note(problem));
+                    }
+                    match made {
                         Ok(frame) => voice.tell(News::Frame(Box::new(Frame { serial, number, grey, ..frame }))),
                         Err(problem) => voice.tell(News::Note(problem)),
                     }
@@ -409,8 +415,7 @@ fn frame(
     sea: Option<&mut Sea>,
     wish: &Wish,
 ) -> Result<Frame, String> {
-    // Waves that nobody sees or feels cost nothing.
-    let sea = sea.filter(|_| wish.waves || wish.probes.is_some()).map(|sea| {
+    let sea = sea.map(|sea| {
         if sea.time() != wish.time {
             sea.set_time(wish.time);
         }
@@ -433,6 +438,21 @@ fn frame(
         second: second.map(chosen).transpose()?,
         heights,
     })
+}
+
+/// Brings the waves of a sea to natural pictures, as it stands now. `seen` is what they have shown so far: whether any, and of which instant (s).
+fn show_waves(scenery: &Scenery, gpu: &Gpu, sea: Option<&Sea>, seen: &mut (bool, f64)) -> Result<(), String> {
+    let now = (sea.is_some(), sea.map_or(f64::NAN, Sea::time));
+    let before = std::mem::replace(seen, now);
+    match sea {
+        Some(sea) if !before.0 => scenery.set_waves(gpu, Some(sea)),
+        Some(sea) if before.1 != now.1 => {
+            scenery.follow_waves(gpu, sea);
+            Ok(())
+        }
+        None if before.0 => scenery.set_waves(gpu, None),
+        _ => Ok(()),
+    }
 }
 
 /// What a method chooses for a view.

@@ -23,9 +23,7 @@ impl Style {
     /// What it is called, and what it does.
     pub fn words(self) -> (&'static str, &'static str) {
         match self {
-            Style::Natural => {
-                ("Natural", "Rock, scree, grass, woods, sand and snow in the light of the day; water lies still")
-            }
+            Style::Natural => ("Natural", "Rock, scree, grass, woods, sand, snow and the sea in the light of the day"),
             Style::Plain => {
                 ("Plain", "The triangles themselves, flatly lit, waves as well: quick without a graphics card")
             }

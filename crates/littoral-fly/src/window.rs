@@ -147,6 +147,8 @@ impl Flight {
             // Without a graphics card, light for every pixel of a window takes too long.
             cockpit.settings.coarse = 4;
         }
+        // And a picture of which a part always moves would never get sharp.
+        cockpit.still = paint.gpu.is_software();
         if let Some(note) = app.note.take() {
             cockpit.note(note);
         }

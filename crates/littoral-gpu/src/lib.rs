@@ -15,6 +15,7 @@ mod renderer;
 mod scenery;
 pub mod sea;
 mod triangles;
+mod waves;
 
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
@@ -23,3 +24,4 @@ pub use renderer::{Renderer, SHADERS};
 pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
 pub use triangles::{TooMany, Triangles};
+pub use waves::{WavesError, wave_shaders};

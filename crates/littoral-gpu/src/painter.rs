@@ -5,8 +5,9 @@ use crate::frame::Look;
 use crate::renderer::Renderer;
 use crate::scenery::{Scenery, TooLarge};
 use crate::triangles::{TooMany, Triangles};
+use crate::waves::WavesError;
 use glam::{UVec2, Vec2};
-use littoral::field::HeightField;
+use littoral::field::{HeightField, Sea};
 use littoral::lod::Mesh;
 use littoral::picture::{Picture, Stage};
 use littoral::space::{Datum, View};
@@ -43,6 +44,9 @@ pub enum PainterError {
         /// Most pixels along a side.
         most: u32,
     },
+    /// Waves that it does not draw.
+    #[error(transparent)]
+    Waves(#[from] WavesError),
     /// Something that it does not draw.
     #[error("expected land in natural colours, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
@@ -70,12 +74,26 @@ impl Painter {
         Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), white: tables.white })
     }
 
+    /// Draws the waves of a sea where it stands, from here on; or still water.
+    ///
+    /// # Errors
+    /// If the sea is made in ways that the device does not know, or too large for it.
+    pub fn set_waves(&mut self, sea: Option<&Sea>) -> Result<(), PainterError> {
+        self.scenery.set_waves(&self.gpu, sea)?;
+        Ok(self.gpu.check()?)
+    }
+
+    /// Goes on to the instant at which the sea of [`Painter::set_waves`] stands now.
+    pub fn follow_waves(&mut self, sea: &Sea) {
+        self.scenery.follow_waves(&self.gpu, sea);
+    }
+
     /// What paints.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
-    /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times; water is still. `progress` is told the fraction done.
+    /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times. `progress` is told the fraction done.
     ///
     /// # Errors
     /// If the picture or the mesh is larger than the device's textures or buffers, or the device was lost.

@@ -46,7 +46,7 @@ fn gather(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let f = p - floor(p);
         let top = mix(look_at(i), look_at(i + vec2i(1, 0)), f.x);
         let bottom = mix(look_at(i + vec2i(0, 1)), look_at(i + 1), f.x);
-        return vec4f(mix(top, bottom, f.y), 1.0) * 1e-3;
+        return vec4f(mix(top, bottom, f.y), 1.0) * 1e-5;
     }
     var sum = textureLoad(sums, vec2u(position.xy), 0);
     if gathering.fresh != 0u {
