@@ -32,7 +32,7 @@ use camera::Mode;
 use clap::Parser;
 use glam::UVec2;
 use littoral::lod::Method;
-use settings::{Settings, Show, Split, Style};
+use settings::{Detail, Settings, Show, Split, Style};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -81,7 +81,7 @@ struct Arguments {
     /// How long a frame may take, in milliseconds: the tolerance follows; 0 for as long as it takes
     #[arg(long, value_name = "MS", value_parser = budget)]
     budget: Option<f64>,
-    /// Another method beside it: two pictures of the same view, and how far apart they are
+    /// Another method beside it, as fine and with as many triangles: two pictures of the same view, and how far apart they are
     #[arg(long, value_name = "METHOD")]
     against: Option<Method>,
     /// How the picture is drawn: in the light of the data, or as the triangles themselves
@@ -151,7 +151,7 @@ impl Arguments {
         first.triangles = self.triangles.unwrap_or(first.triangles);
         settings.budget_milliseconds = self.budget.unwrap_or(settings.budget_milliseconds);
         if let Some(method) = self.against {
-            (settings.second.method, settings.split) = (method, Split::Halves);
+            (settings.second, settings.split) = (Detail { method, ..*first }, Split::Halves);
         }
         settings.style = self.style.unwrap_or(settings.style);
         settings.coarse = self.coarse.unwrap_or(settings.coarse);
@@ -188,7 +188,6 @@ fn main() -> ExitCode {
 mod tests {
     use super::*;
     use clap::CommandFactory;
-    use settings::Detail;
 
     #[test]
     fn the_command_line_holds_together() {
@@ -209,6 +208,7 @@ mod tests {
             settings,
             Settings {
                 first: Detail { method: Method::Roam, ..Detail::default() },
+                second: Detail { method: Method::Whole, ..Detail::default() },
                 split: Split::Halves,
                 waves: false,
                 sea: "calm".into(),

@@ -345,7 +345,8 @@ fn fly(
                     scenery.see_from(gpu, &stage, wish.eye.eye.z);
                     sky = (begun.elapsed(), Instant::now());
                 }
-                if answered.as_ref() != Some(&*wish) {
+                // A view that rests is metered once more, where the last measurement was of another one.
+                if answered.as_ref() != Some(&*wish) || meter.wants(&wish.eye) {
                     first.follow(wish.first);
                     match (&mut second, wish.second) {
                         (Some(second), Some(detail)) => second.follow(detail),
@@ -469,22 +470,29 @@ fn choose(chooser: &mut Chooser, sea: Option<&Sea>, view: &View) -> Result<Choic
 /// Meters the light, as a photographer does: by a small picture of what is seen, now and then.
 #[derive(Default)]
 struct Meter {
-    last: Option<(f32, Instant)>,
+    last: Option<(f32, View, Instant)>,
 }
 
 impl Meter {
+    /// Measurements are so far apart.
+    const EVERY: Duration = Duration::from_millis(900);
+
+    /// Whether it is time for another measurement, and another view than the last one's.
+    fn wants(&self, eye: &View) -> bool {
+        self.last.as_ref().is_none_or(|(_, of, when)| of != eye && when.elapsed() >= Meter::EVERY)
+    }
+
     /// The radiance of middle grey (kcd/m²).
     fn grey(&mut self, stage: &Stage<'_>, eye: &View) -> f32 {
         const SIZE: UVec2 = UVec2::new(48, 27);
-        const EVERY: Duration = Duration::from_millis(900);
         match self.last {
-            Some((grey, when)) if when.elapsed() < EVERY => grey,
+            Some((grey, ..)) if !self.wants(eye) => grey,
             _ => {
                 let pixels_per_radian = eye.pixels_per_radian * SIZE.y as f32 / eye.size.y.max(1) as f32;
                 let small = View { size: SIZE, pixels_per_radian, ..*eye };
                 let settings = picture::Settings { samples: 1, passes: false, ..picture::Settings::default() };
                 let grey = stage.render(&small, &settings, &|_| {}).grey().max(1e-6);
-                self.last = Some((grey, Instant::now()));
+                self.last = Some((grey, *eye, Instant::now()));
                 grey
             }
         }
