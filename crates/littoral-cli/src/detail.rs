@@ -4,13 +4,10 @@ use crate::input;
 use crate::render::Render;
 use crate::subject::Subject;
 use crate::talk::{Failure, Talk, progress, tidy};
-use clap::ValueEnum;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
 use littoral::field::{HeightField, Land, Sea};
-use littoral::lod::{
-    Drawing, Limits, Lod, Mesh, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, Strips, ViewError,
-    Whole,
-};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Reached, RoamFlight, ViewError};
 use littoral::picture::{Meshes, Picture, Settings, Stage};
 use littoral::space::{Datum, View};
 use littoral_gpu::{Gpu, Painter, PainterError};
@@ -20,7 +17,7 @@ use std::time::Instant;
 #[derive(clap::Args, Clone, Debug)]
 pub struct Detail {
     /// Draw a mesh that this method of detail chooses, instead of the exact surface; the same light falls on it
-    #[arg(long, value_enum, value_name = "METHOD", help_heading = "Mesh")]
+    #[arg(long, value_parser = methods(), value_name = "METHOD", help_heading = "Mesh")]
     pub lod: Option<Method>,
     /// How far from its place the mesh may be drawn, in pixels
     #[arg(long, value_name = "PIXELS", value_parser = input::tolerance, default_value = "1", requires = "lod", help_heading = "Mesh")]
@@ -40,35 +37,10 @@ pub struct Detail {
     pub lod_from: Option<DVec3>,
 }
 
-/// A method of detail.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Method {
-    /// Everything equally fine: what the others are measured by
-    Whole,
-    /// Nested square windows, joined by upright strips: for seas
-    Nested,
-    /// A restricted quadtree whose patches morph
-    Quadtree,
-    /// Triangles cut level by level, edges deciding
-    Patches,
-    /// Strips along rows whose cells change size on the way
-    Strips,
-    /// A bintree of right triangles, the worst split first
-    Roam,
-}
-
-impl Method {
-    /// The method within limits.
-    pub fn within(self, limits: Limits) -> Box<dyn Lod> {
-        match self {
-            Method::Whole => Box::new(Whole::new(limits)),
-            Method::Nested => Box::new(Nested::new(limits)),
-            Method::Quadtree => Box::new(Quadtree::new(limits)),
-            Method::Patches => Box::new(Patches::new(limits)),
-            Method::Strips => Box::new(Strips::new(limits)),
-            Method::Roam => Box::new(Roam::new(limits)),
-        }
-    }
+/// The methods of detail by name, each with what it does.
+fn methods() -> impl TypedValueParser<Value = Method> {
+    let named = |method: Method| PossibleValue::new(method.name()).help(method.description());
+    PossibleValuesParser::new(Method::ALL.map(named)).try_map(|name| name.parse::<Method>())
 }
 
 /// A method at work: picture after picture, it keeps what it can.

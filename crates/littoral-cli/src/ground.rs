@@ -346,9 +346,9 @@ impl Frame {
         if matches!(self.georeference.crs, Crs::Geographic { .. }) { 7 } else { 2 }
     }
 
-    /// The latitude of the middle (degrees), where it can be known.
-    pub fn latitude(&self) -> Option<f64> {
-        self.georeference.lonlat_from_crs(self.georeference.middle()).ok().map(|lonlat| lonlat.y)
+    /// Longitude and latitude of the middle (degrees), where they can be known.
+    pub fn place(&self) -> Option<DVec2> {
+        self.georeference.lonlat_from_crs(self.georeference.middle()).ok()
     }
 
     /// The angle from the land's y axis clockwise to true north (rad).

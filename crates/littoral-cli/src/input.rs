@@ -80,6 +80,27 @@ pub fn sun(text: &str) -> Result<DVec2, String> {
     }
 }
 
+/// An instant such as `2026-06-21T18:30Z`, in seconds since the beginning of 1970, UTC.
+pub fn moment(text: &str) -> Result<f64, String> {
+    let instant: Result<jiff::Timestamp, _> = text.trim().parse();
+    instant.map(|instant| instant.as_millisecond() as f64 * 1e-3).map_err(|_| {
+        let text = text.trim();
+        format!("expected a date and a time with Z or an offset, such as 2026-06-21T18:30Z, got \"{text}\"")
+    })
+}
+
+/// `LONGITUDE,LATITUDE` in degrees.
+pub fn place(text: &str) -> Result<DVec2, String> {
+    let place = DVec2::from(numbers::<2>(text, "LONGITUDE,LATITUDE in degrees, such as -155.2,19.4")?);
+    match place.x.abs() <= 180.0 && place.y.abs() <= 90.0 {
+        true => Ok(place),
+        false => Err(format!(
+            "expected a longitude within 180 and a latitude within 90 degrees, got {},{}",
+            place.x, place.y
+        )),
+    }
+}
+
 /// A number within limits.
 pub fn within(text: &str, low: f64, high: f64, what: &str) -> Result<f64, String> {
     let [number] = numbers::<1>(text, what)?;
@@ -165,6 +186,13 @@ mod tests {
         for wrong in ["0x5", "1280", "-1x5", "99999x5", "1280x720x3"] {
             assert!(size(wrong).is_err_and(|e| e.contains("WIDTHxHEIGHT")), "{wrong}");
         }
+        assert_eq!(moment("2026-06-21T18:30Z"), moment("2026-06-21T20:30:00+02:00"));
+        assert_eq!(moment("1970-01-02T00:00:01Z"), Ok(86_401.0));
+        for wrong in ["2026-06-21T18:30", "2026-06-31T18:30Z", "noon", ""] {
+            assert!(moment(wrong).is_err_and(|e| e.contains("with Z or an offset")), "{wrong}");
+        }
+        assert_eq!(place("-155.2,19.4"), Ok(DVec2::new(-155.2, 19.4)));
+        assert!(place("19.4,-155.2").is_err_and(|e| e.contains("within 90")));
         assert!(sun("300,95").is_err() && field_of_view("0").is_err() && refraction("1").is_err());
     }
 }

@@ -18,6 +18,7 @@ mod profile;
 mod render;
 mod sight;
 mod subject;
+mod sun;
 mod talk;
 mod viewshed;
 mod waves;

@@ -5,12 +5,13 @@ use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
 use crate::subject::Subject;
+use crate::sun::SunChoice;
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use crate::waves::state as sea;
 use clap::ValueEnum;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::{Sea, coast};
-use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Sun, Texture};
+use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Texture};
 use littoral::space::{Ray, View};
 use littoral::waves::SeaState;
 use littoral_data::write::{self, Layer, PngPixels};
@@ -33,6 +34,7 @@ use std::time::Instant;
   littoral render dem.tif --style image --texture ortho.tif
   littoral render dem.tif --out linear.exr --passes depth,normal
   littoral render dem.tif --sea wind=14,from=300 --sun 300,8
+  littoral render dem.tif --sun-at 2026-06-21T18:30Z       in the light of that evening
   littoral render --sea beaufort=8,from=240                the coast in a storm
   littoral render --sea buoy=41010.data_spec               in the waves that a buoy measured
   littoral render dem.tif --lod quadtree --tolerance 2 --wireframe      the mesh that a method of detail draws
@@ -82,9 +84,8 @@ pub struct Render {
     /// A picture to lay over the ground (.tif, .png, .jpg); where it has no place of its own, over all of it
     #[arg(long, value_name = "IMAGE", help_heading = "Look")]
     texture: Option<PathBuf>,
-    /// The sun: compass bearing and height above the horizon in degrees [default: what suits the land]
-    #[arg(long, value_name = "AZIMUTH,ELEVATION", value_parser = input::sun, help_heading = "Look")]
-    sun: Option<DVec2>,
+    #[command(flatten)]
+    sun: SunChoice,
     /// Stretch all heights, the eye's too
     #[arg(long, value_name = "FACTOR", value_parser = input::factor, default_value = "1", help_heading = "Look")]
     exaggeration: f64,
@@ -424,8 +425,8 @@ impl Render {
                 look
             }
         };
-        if let Some(given) = self.sun {
-            sun = Sun::new(given.x.to_radians(), given.y.to_radians());
+        if let Some(chosen) = self.sun.over(&subject.frame, talk)? {
+            sun = chosen;
         }
         if let Some(kilometres) = self.visibility {
             air.visibility = kilometres * 1000.0;
@@ -550,7 +551,7 @@ enum Kind {
 
 /// The climate where the land lies.
 fn climate(frame: &Frame) -> Climate {
-    match frame.latitude() {
+    match frame.place().map(|lonlat| lonlat.y) {
         Some(latitude) => Climate::at_latitude(latitude.to_radians()),
         None => Climate::default(),
     }

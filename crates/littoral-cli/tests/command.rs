@@ -571,3 +571,24 @@ fn broken_files_end_in_a_sentence() {
         }
     }
 }
+
+#[test]
+fn the_sun_follows_date_and_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("a.png").display().to_string();
+    let land = file(folder.path()).display().to_string();
+    let render = ["render", &land, "--size", "32x18", "--samples", "1", "--out", &out, "--sun-at"];
+    // 123° W, 45.15° N: on the day of the solstice the sun stands south at 20:14 UTC, 68.3° high.
+    let noon = json(&[&render[..], &["2026-06-21T20:14Z"]].concat());
+    let at = |i: usize| noon["sun"][i].as_f64().expect("a number");
+    assert!((at(0) - 180.0).abs() < 1.0 && (at(1) - 68.3).abs() < 0.2, "{}", noon["sun"]);
+    let night = json(&[&render[..], &["2026-06-21T00:14-08:00"]].concat());
+    assert!(night["warnings"].to_string().contains("below the horizon"), "{}", night["warnings"]);
+    let elsewhere = json(&[&render[..], &["2026-12-21T12:00Z", "--sun-place", "0,-23.44"]].concat());
+    assert!(elsewhere["sun"][1].as_f64().expect("a number") > 89.0, "{}", elsewhere["sun"]);
+    // Land without a place has no sun by date.
+    let said = fails(&["render", "--size", "32x18", "--out", &out, "--sun-at", "2026-06-21T12:00Z"], 2);
+    assert!(said.contains("--sun-place"), "{said}");
+    let said = fails(&["render", "--sun-at", "2026-06-21"], 2);
+    assert!(said.contains("2026-06-21T18:30Z"), "{said}");
+}

@@ -162,6 +162,8 @@ const PART: f64 = 1.0 / 120.0;
 const LONGEST: f64 = 0.25;
 /// No flight comes nearer to the surface than this (m).
 const CLEARANCE: f64 = 1.0;
+/// Slower than this (m/s) is standing still.
+const STILL: f64 = 0.01;
 /// The steepest look (rad), short of the pole.
 const STEEPEST: f64 = FRAC_PI_2 - 0.01;
 /// Turning by keys (rad/s).
@@ -319,6 +321,10 @@ impl Camera {
         let left = (-dt / lag).exp();
         self.eye += wanted * dt + (self.velocity - wanted) * (lag * (1.0 - left));
         self.velocity = wanted + (self.velocity - wanted) * left;
+        // Who hardly moves rests, and so does the picture.
+        if wanted == DVec3::ZERO && self.velocity.length() < STILL {
+            self.velocity = DVec3::ZERO;
+        }
     }
 
     /// Not below the surface, unless that is allowed.

@@ -1,8 +1,8 @@
 //! A method at work over one land, frame after frame.
 
-use crate::settings::Method;
+use crate::settings::Detail;
 use littoral::field::{HeightField, Land, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, NestedBounds, Reached, RoamFlight, ViewError};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Reached, RoamFlight, ViewError};
 use littoral::space::{Datum, View};
 use std::cell::OnceCell;
 
@@ -11,8 +11,7 @@ pub struct Chooser<'a> {
     land: &'a Land,
     /// What ROAM needs to go on from frame to frame, made when it is first wanted.
     bounds: &'a OnceCell<Option<NestedBounds>>,
-    method: Method,
-    triangles: usize,
+    detail: Detail,
     ground: Box<dyn Lod>,
     flight: Option<RoamFlight<'a>>,
     water: Option<Box<dyn Lod>>,
@@ -25,14 +24,9 @@ const SMALLEST: f64 = 0.25;
 
 impl<'a> Chooser<'a> {
     /// A method over a land, with nothing chosen yet.
-    pub fn new(
-        land: &'a Land,
-        bounds: &'a OnceCell<Option<NestedBounds>>,
-        method: Method,
-        triangles: usize,
-    ) -> Chooser<'a> {
-        let limits = Limits { finest: land.finest_level(), triangles };
-        let flight = match method {
+    pub fn new(land: &'a Land, bounds: &'a OnceCell<Option<NestedBounds>>, detail: Detail) -> Chooser<'a> {
+        let limits = Limits { finest: land.finest_level(), triangles: detail.triangles as usize };
+        let flight = match detail.method {
             // Land that is too large for a flight is served by ROAM anew for each frame.
             Method::Roam => bounds
                 .get_or_init(|| NestedBounds::of(land).ok())
@@ -43,9 +37,8 @@ impl<'a> Chooser<'a> {
         Chooser {
             land,
             bounds,
-            method,
-            triangles,
-            ground: method.within(limits),
+            detail,
+            ground: detail.method.within(limits),
             flight,
             water: None,
             ground_drawing: Drawing::default(),
@@ -53,11 +46,17 @@ impl<'a> Chooser<'a> {
         }
     }
 
-    /// Goes on with another method or another limit, if they are others.
-    pub fn follow(&mut self, method: Method, triangles: usize) {
-        if (method, triangles) != (self.method, self.triangles) {
-            *self = Chooser::new(self.land, self.bounds, method, triangles);
+    /// Goes on as wished: another method or another limit begins anew, another tolerance does not.
+    pub fn follow(&mut self, detail: Detail) {
+        if (detail.method, detail.triangles) != (self.detail.method, self.detail.triangles) {
+            *self = Chooser::new(self.land, self.bounds, detail);
         }
+        self.detail = detail;
+    }
+
+    /// How it chooses.
+    pub fn detail(&self) -> Detail {
+        self.detail
     }
 
     /// The triangles of the ground for a view.
@@ -73,14 +72,14 @@ impl<'a> Chooser<'a> {
 
     /// The triangles of a sea for a view.
     pub fn water(&mut self, sea: &Sea, view: &View) -> Result<(Mesh, Reached), ViewError> {
-        let (method, triangles) = (self.method, self.triangles);
+        let detail = self.detail;
         let lod = self.water.get_or_insert_with(|| {
             let side = match sea.datum() {
                 Datum::Plane { size, .. } => size.max_element(),
                 Datum::Ellipsoid { equatorial_radius, .. } => equatorial_radius,
             };
             let finest = (side / SMALLEST).log2().ceil().clamp(0.0, 30.0) as u8;
-            method.within(Limits { finest, triangles })
+            detail.method.within(Limits { finest, triangles: detail.triangles as usize })
         });
         choose(&mut **lod, sea, view, &mut self.water_drawing)
     }

@@ -1,10 +1,13 @@
 //! The state of a flight, apart from window and scene: what is wished for, what came, and what the hands do with it.
 
+use crate::calendar;
 use crate::camera::{Camera, Hands, Mode, World};
+use crate::compare::Difference;
 use crate::draw::Scenery;
 use crate::editor::Editor;
 use crate::scene::{Frame, Look, News, Wish};
-use crate::settings::{Settings, Style};
+use crate::settings::{Detail, Settings, Split, Style, SunBy};
+use crate::steering::Steering;
 use crate::subject::{Order, Subject};
 use crate::tape::Tape;
 use glam::{DVec2, DVec3, UVec2, Vec2};
@@ -103,6 +106,14 @@ pub struct Cockpit {
     pub notes: Vec<Note>,
     /// Numbers.
     pub history: History,
+    /// Where the second picture begins, as a share of the window's width.
+    pub divider: f32,
+    /// How far apart the two pictures are.
+    pub difference: Option<Difference>,
+    /// Whether the picture rests, and is only made cleaner.
+    pub rests: bool,
+    /// What keeps frames within their budget of time.
+    pub steering: Option<Steering>,
     /// What the sea's state is while it is typed.
     pub sea_text: String,
     /// Logarithm of the radiance that is shown as middle grey.
@@ -138,6 +149,10 @@ impl Cockpit {
             working: Some(("opening".to_owned(), 0.0)),
             notes: Vec::new(),
             history: History::default(),
+            divider: 0.5,
+            difference: None,
+            rests: false,
+            steering: None,
             grey: None,
             clock: 0.0,
         }
@@ -176,9 +191,9 @@ impl Cockpit {
                     if let Some(heights) = frame.heights {
                         self.camera.boat.float(heights);
                     }
-                    History::push(&mut self.history.method, frame.milliseconds);
-                    History::push(&mut self.history.triangles, frame.triangles() as f64);
-                    History::push(&mut self.history.bound, f64::from(frame.ground_reached.pixels));
+                    History::push(&mut self.history.method, frame.first.milliseconds);
+                    History::push(&mut self.history.triangles, frame.first.triangles() as f64);
+                    History::push(&mut self.history.bound, f64::from(frame.first.ground_reached.pixels));
                     self.frame = Some(*frame);
                 }
             }
@@ -231,6 +246,22 @@ impl Cockpit {
         Some(DVec2::new(sun.azimuth.to_degrees().rem_euclid(360.0), sun.elevation.to_degrees()))
     }
 
+    /// The place of the land: longitude and latitude (degrees), its own or as entered.
+    pub fn place(&self) -> DVec2 {
+        calendar::place(&self.settings, self.subject.as_ref().and_then(|subject| subject.lonlat()))
+    }
+
+    /// The sun that is wished for; `None` for the one that suits the land.
+    pub fn sun(&self) -> Option<Sun> {
+        let settings = &self.settings;
+        let [azimuth, elevation] = [settings.sun_azimuth_degrees, settings.sun_elevation_degrees].map(f64::to_radians);
+        match settings.sun {
+            SunBy::Land => None,
+            SunBy::Hand => Some(Sun::new(azimuth, elevation)),
+            SunBy::Date => calendar::sun(settings, self.place()),
+        }
+    }
+
     /// Vertical angle of view (rad).
     fn field(&self) -> f64 {
         self.settings.field_degrees.to_radians()
@@ -243,38 +274,70 @@ impl Cockpit {
 
     /// The view that triangles are chosen for.
     pub fn lod_view(&self, size: UVec2) -> View {
-        let view = self.frozen.unwrap_or_else(|| self.camera.view(self.field(), size, WIDER));
-        View { tolerance_pixels: self.settings.tolerance_pixels as f32, ..view }
+        self.frozen.unwrap_or_else(|| self.camera.view(self.field(), size, WIDER))
     }
 
-    /// Whether waves are drawn.
+    /// How triangles are to be chosen: as set, or as finely as the budget of time allows.
+    pub fn first(&self) -> Detail {
+        match &self.steering {
+            Some(steering) => Detail { tolerance_pixels: steering.tolerance(), ..self.settings.first },
+            None => self.settings.first,
+        }
+    }
+
+    /// How triangles of a second picture are to be chosen, if there is one.
+    pub fn second(&self) -> Option<Detail> {
+        (self.settings.split != Split::Off).then_some(self.settings.second)
+    }
+
+    /// Steers the tolerance after a frame that took so long (ms), if there is a budget. Two pictures have none: each is to be seen as it was set.
+    pub fn steer(&mut self, milliseconds: f64) {
+        let budget = self.settings.budget_milliseconds;
+        if budget <= 0.0 || self.settings.split != Split::Off {
+            self.steering = None;
+            return;
+        }
+        let begun = self.settings.first.tolerance_pixels;
+        let steering = self.steering.get_or_insert_with(|| Steering::at(begun));
+        // Only frames count that are drawn with triangles of the tolerance of now; those of a picture that rests are quicker than a flight's.
+        let drawn =
+            self.frame.as_ref().is_some_and(|frame| frame.first.detail.tolerance_pixels == steering.tolerance());
+        if drawn && !self.rests && self.working.is_none() {
+            steering.frame(milliseconds, budget);
+        }
+    }
+
+    /// Whether waves are wanted as triangles: natural pictures make them of the sea itself.
     fn shows_waves(&self) -> bool {
         self.settings.style == Style::Plain
     }
 
-    /// The instant of the sea that is wished for (s): a sea that is neither seen nor felt stands still.
+    /// The instant of the sea that is wished for (s): still water has but one.
     pub fn sea_time(&self) -> f64 {
-        if self.shows_waves() || self.camera.mode() == Mode::Boat { self.time } else { 0.0 }
+        if self.settings.waves { self.time } else { 0.0 }
     }
 
     /// What is wished for, in a picture of this size.
     pub fn wish(&self, size: UVec2) -> Wish {
         let settings = &self.settings;
-        let sun = (!settings.own_sun)
-            .then(|| Sun::new(settings.sun_azimuth_degrees.to_radians(), settings.sun_elevation_degrees.to_radians()));
         let visibility = (settings.visibility_kilometres > 0.0).then_some(settings.visibility_kilometres * 1000.0);
         Wish {
             order: self.order.clone(),
-            look: Look { sun, visibility },
+            look: Look { sun: self.sun(), visibility },
             sea: settings.waves.then(|| settings.sea.clone()),
-            method: settings.method,
-            triangles: settings.triangles as usize,
+            first: self.first(),
+            second: self.second(),
             view: self.lod_view(size),
             eye: self.view(size),
             waves: self.shows_waves(),
             time: self.sea_time(),
             probes: (self.camera.mode() == Mode::Boat).then(|| self.camera.boat.probes()),
         }
+    }
+
+    /// Multiplies all speeds.
+    pub fn faster(&mut self, by: f64) {
+        self.settings.speed = (self.settings.speed * by).clamp(0.05, 20.0);
     }
 
     /// Freezes the view that triangles are chosen for, or lets it follow the eye again.

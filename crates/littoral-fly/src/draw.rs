@@ -1,13 +1,16 @@
-//! What is drawn of a frame, and how: in the light of the data, or plainly.
+//! What is drawn of a frame, and how: in the light of the data, or plainly; by one method or by two; at once, or more cleanly the longer it rests.
 
+use crate::compare::{Compare, Difference, Shown};
 use crate::plain;
-use crate::scene::Frame;
-use crate::settings::{Settings, Show, Style};
-use glam::UVec2;
-use littoral::field::HeightField;
+use crate::rest::{self, Gathered, Gatherer};
+use crate::scene::{Choice, Frame};
+use crate::settings::{Settings, Show, Split, Style};
+use glam::{Mat4, UVec2, Vec2};
+use littoral::field::{HeightField, Sea};
 use littoral::picture::Stage;
 use littoral::space::{Datum, View};
 use littoral_gpu::{Gpu, Ground, Look, Triangles};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A land and its light, ready to be drawn.
@@ -16,6 +19,8 @@ pub struct Scenery {
     /// For pictures in the light of the data; shared with the scene, which brings the sky of other heights.
     full: Option<Arc<Mutex<littoral_gpu::Scenery>>>,
     plain: Arc<plain::Scenery>,
+    /// How often it has changed since.
+    changes: Arc<AtomicU64>,
 }
 
 impl Scenery {
@@ -32,7 +37,28 @@ impl Scenery {
             Ok(scenery) => (Some(Arc::new(Mutex::new(scenery))), None),
             Err(problem) => (None, Some(problem)),
         };
-        (Scenery { full, plain: Arc::new(plain::Scenery::new(stage)) }, problem)
+        (Scenery { full, plain: Arc::new(plain::Scenery::new(stage)), changes: Arc::default() }, problem)
+    }
+
+    /// Which scenery it is, and in which state.
+    fn state(&self) -> (usize, u64) {
+        (Arc::as_ptr(&self.plain) as usize, self.changes.load(Ordering::Relaxed))
+    }
+
+    /// Draws the waves of a sea from now on, or still water. What cannot be drawn lies still; the sentence says why.
+    pub fn set_waves(&self, gpu: &Gpu, sea: Option<&Sea>) -> Result<(), String> {
+        let Some(full) = &self.full else { return Ok(()) };
+        let set = full.lock().unwrap_or_else(PoisonError::into_inner).set_waves(gpu, sea);
+        self.changes.fetch_add(1, Ordering::Relaxed);
+        set.map_err(|e| format!("{e}; natural pictures show still water"))
+    }
+
+    /// Goes on to the instant at which the sea of [`Scenery::set_waves`] stands now.
+    pub fn follow_waves(&self, gpu: &Gpu, sea: &Sea) {
+        if let Some(full) = &self.full {
+            full.lock().unwrap_or_else(PoisonError::into_inner).follow_waves(gpu, sea);
+            self.changes.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// Brings the sky as it is seen from a height (m), if it is another one. The lock is held while it is copied, not while it is made.
@@ -42,7 +68,88 @@ impl Scenery {
         if locked().wants_sky(height) {
             let sky = stage.sky_table(height);
             locked().set_sky(gpu, height, &sky);
+            self.changes.fetch_add(1, Ordering::Relaxed);
         }
+    }
+}
+
+/// What is to be seen.
+pub struct Seen<'a> {
+    /// The land and its light.
+    pub scenery: &'a Scenery,
+    /// The meshes.
+    pub frame: &'a Frame,
+    /// How it is shown.
+    pub settings: &'a Settings,
+    /// The radiance that is shown as middle grey (kcd/m²).
+    pub grey: f32,
+    /// The eye, and the pixels of the window.
+    pub view: View,
+    /// Where the second picture begins, as a share of the width.
+    pub divider: f32,
+}
+
+impl Seen<'_> {
+    /// The pictures that are shown.
+    fn choices(&self) -> impl Iterator<Item = &Choice> {
+        let second = self.frame.second.as_ref().filter(|_| self.settings.split != Split::Off);
+        std::iter::once(&self.frame.first).chain(second)
+    }
+
+    /// One pixel of light for so many of the window's, each way. Edges are drawn by the window's own.
+    fn coarse(&self) -> u32 {
+        match (self.settings.style, self.settings.show) {
+            (Style::Natural, Show::Textured) => self.settings.coarse.max(1),
+            _ => 1,
+        }
+    }
+
+    /// How two pictures are shown.
+    fn shown(&self) -> Shown {
+        match self.settings.split {
+            Split::Difference => Shown::Difference(self.settings.gain as f32),
+            _ => Shown::Halves((self.divider * self.view.size.x as f32).round()),
+        }
+    }
+}
+
+/// All that a picture depends on; but for the exposure, which settles slowly.
+#[derive(Clone, PartialEq)]
+struct Pose {
+    view: View,
+    frame: (u64, u64),
+    scenery: (usize, u64),
+    settings: Settings,
+}
+
+/// A picture at rest.
+#[derive(Default)]
+struct Rest {
+    pose: Option<(Pose, f32)>,
+    /// Frames since it rests.
+    frames: u32,
+    gathered: [Gathered; 2],
+}
+
+impl Rest {
+    /// How many frames it has been the same picture.
+    fn follow(&mut self, seen: &Seen) -> u32 {
+        let pose = Pose {
+            view: seen.view,
+            frame: (seen.frame.serial, seen.frame.number),
+            scenery: seen.scenery.state(),
+            // Neither the panel nor the gain changes what is looked at.
+            settings: Settings { panel: true, gain: 1.0, ..seen.settings.clone() },
+        };
+        /// An exposure that is this near is the same.
+        const ALIKE: f32 = 0.015;
+        let same =
+            self.pose.as_ref().is_some_and(|(before, grey)| *before == pose && (seen.grey / grey).ln().abs() < ALIKE);
+        match same {
+            true => self.frames = self.frames.saturating_add(1),
+            false => (self.pose, self.frames) = (Some((pose, seen.grey)), 0),
+        }
+        self.frames
     }
 }
 
@@ -50,60 +157,158 @@ impl Scenery {
 pub struct Renderer {
     full: littoral_gpu::Renderer,
     plain: plain::Renderer,
-    ground: Triangles,
-    /// Which frame's ground that is.
-    holds: Option<u64>,
+    grounds: [Triangles; 2],
+    /// Which frame's grounds those are.
+    holds: Option<(u64, u64)>,
+    compare: Compare,
+    gatherer: Gatherer,
+    rest: Rest,
 }
 
 impl Renderer {
     /// For targets of a format.
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Renderer {
-        let full = littoral_gpu::Renderer::new(gpu, format);
-        Renderer { full, plain: plain::Renderer::new(gpu, format), ground: Triangles::default(), holds: None }
+        Renderer {
+            full: littoral_gpu::Renderer::new(gpu, format),
+            plain: plain::Renderer::new(gpu, format),
+            grounds: Default::default(),
+            holds: None,
+            compare: Compare::new(gpu, format),
+            gatherer: Gatherer::new(gpu, format),
+            rest: Rest::default(),
+        }
     }
 
-    /// Draws what a camera sees; `view` tells it for a number of pixels. `grey` is the radiance that is shown as middle grey (kcd/m²).
+    /// How far apart the two pictures were that were shown last.
+    pub fn difference(&self) -> Option<Difference> {
+        self.compare.difference
+    }
+
+    /// Draws the window's picture: quickly while something moves, cleaner with each frame that nothing does. `true` while it rests.
+    pub fn show(&mut self, gpu: &Gpu, seen: &Seen, target: &wgpu::TextureView) -> bool {
+        self.hold(gpu, seen);
+        let frames = self.rest.follow(seen);
+        if frames == 0 {
+            self.at_once(gpu, seen, seen.coarse(), target);
+            return false;
+        }
+        let (size, coarse) = (seen.view.size, seen.coarse());
+        // The first frame of a rest looks through the middle of coarse pixels, as moving pictures do.
+        let part = (frames > 1).then(|| rest::part(frames - 1, size, coarse));
+        if frames <= 1 + rest::looks(coarse) {
+            let view = rest::spread(&seen.view, coarse);
+            for (side, choice) in seen.choices().enumerate() {
+                let look = self.gatherer.look(gpu, &mut self.rest.gathered[side], view.size);
+                let through = part.map_or(Look::default(), |part| part.look);
+                self.draw(gpu, seen, (side, choice), &view, through, &look, view.size);
+                self.gatherer.gather(gpu, &mut self.rest.gathered[side], part, size, coarse);
+            }
+        }
+        self.gathered(gpu, seen, target);
+        true
+    }
+
+    /// Draws a picture for good, as sharp as the target: the one that rests, if every pixel of it was looked through.
+    pub fn copy(&mut self, gpu: &Gpu, seen: &Seen, target: &wgpu::TextureView) {
+        self.hold(gpu, seen);
+        match self.rest.frames > seen.coarse().pow(2) {
+            true => self.gathered(gpu, seen, target),
+            false => self.at_once(gpu, seen, 1, target),
+        }
+    }
+
+    /// Brings the grounds of a frame to the device.
+    fn hold(&mut self, gpu: &Gpu, seen: &Seen) {
+        let frame = Some((seen.frame.serial, seen.frame.number));
+        if self.holds == frame || seen.settings.style != Style::Natural {
+            return;
+        }
+        let choices = std::iter::once(&seen.frame.first).chain(&seen.frame.second);
+        for (ground, choice) in self.grounds.iter_mut().zip(choices) {
+            // No budget of the panel's is too large for what WebGPU promises of buffers; if one were, the triangles before stay.
+            if let Err(problem) = ground.set(gpu, &choice.ground) {
+                eprintln!("littoral-fly: {problem}");
+            }
+        }
+        self.holds = frame;
+    }
+
+    /// Where each of the pictures is to be drawn: alone on the target, or to be compared.
+    fn targets(&mut self, gpu: &Gpu, seen: &Seen, target: &wgpu::TextureView) -> Vec<wgpu::TextureView> {
+        match seen.choices().count() {
+            1 => vec![target.clone()],
+            _ => self.compare.pictures(gpu, seen.view.size).into(),
+        }
+    }
+
+    /// Draws each picture with one look.
+    fn at_once(&mut self, gpu: &Gpu, seen: &Seen, coarse: u32, target: &wgpu::TextureView) {
+        let size = (seen.view.size / coarse).max(UVec2::ONE);
+        let scale = size.y as f32 / seen.view.size.y.max(1) as f32;
+        let view = View { size, pixels_per_radian: seen.view.pixels_per_radian * scale, ..seen.view };
+        let targets = self.targets(gpu, seen, target);
+        for (side, (choice, target)) in seen.choices().zip(&targets).enumerate() {
+            self.draw(gpu, seen, (side, choice), &view, Look::default(), target, seen.view.size);
+        }
+        if targets.len() > 1 {
+            self.compare.show(gpu, seen.shown(), target);
+        }
+    }
+
+    /// Shows what was gathered of each picture.
+    fn gathered(&mut self, gpu: &Gpu, seen: &Seen, target: &wgpu::TextureView) {
+        let targets = self.targets(gpu, seen, target);
+        for (gathered, target) in self.rest.gathered.iter().zip(&targets) {
+            self.gatherer.show(gpu, gathered, target);
+        }
+        if targets.len() > 1 {
+            self.compare.show(gpu, seen.shown(), target);
+        }
+    }
+
+    /// Draws one picture, stretched over a target of some size (pixels).
     #[allow(clippy::too_many_arguments, reason = "what is drawn, how, and onto what")]
-    pub fn draw(
+    fn draw(
         &mut self,
         gpu: &Gpu,
-        scenery: &Scenery,
-        frame: &Frame,
-        settings: &Settings,
-        grey: f32,
-        view: &dyn Fn(UVec2) -> View,
+        seen: &Seen,
+        (side, choice): (usize, &Choice),
+        view: &View,
+        look: Look,
         target: &wgpu::TextureView,
         size: UVec2,
     ) {
+        let settings = seen.settings;
         let (surface, wireframe) = (settings.show != Show::Wireframe, settings.show != Show::Textured);
-        let full = scenery.full.as_ref().filter(|_| settings.style == Style::Natural);
+        let full = seen.scenery.full.as_ref().filter(|_| settings.style == Style::Natural);
         let Some(full) = full else {
-            let (ground, water) = (&frame.ground, frame.water.as_ref());
-            let drawn = plain::Frame { view: &view(size), ground, water, surface, wireframe };
-            return self.plain.draw(gpu, &scenery.plain, &drawn, target);
+            let (ground, water) = (&choice.ground, choice.water.as_ref());
+            let drawn = plain::Frame { view: &moved(view, look), ground, water, surface, wireframe };
+            return self.plain.draw(gpu, &seen.scenery.plain, &drawn, target);
         };
-        if self.holds != Some(frame.number) {
-            // No budget of the panel's is too large for what WebGPU promises of buffers; if one were, the triangles before stay.
-            if let Err(problem) = self.ground.set(gpu, &frame.ground) {
-                eprintln!("littoral-fly: {problem}");
-            }
-            self.holds = Some(frame.number);
-        }
-        // Edges are drawn by the pixels of the target.
-        let coarse = if wireframe { 1 } else { settings.coarse };
-        let view = view((size / coarse).max(UVec2::ONE));
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let locked = full.lock().unwrap_or_else(PoisonError::into_inner);
-        self.full.draw(gpu, &mut encoder, &locked, Ground::Triangles(&self.ground), &view, Look::default());
+        let ground = &self.grounds[side];
+        self.full.draw(gpu, &mut encoder, &locked, Ground::Triangles(ground), view, look);
         match surface {
-            true => self.full.show(gpu, &mut encoder, &locked, grey, target, size),
+            true => self.full.show(gpu, &mut encoder, &locked, seen.grey, target, size),
             false => clear(&mut encoder, target, [0.82, 0.84, 0.86]),
         }
         if wireframe {
-            self.full.wires(gpu, &mut encoder, &self.ground, target);
+            self.full.wires(gpu, &mut encoder, ground, target);
         }
         gpu.queue.submit([encoder.finish()]);
     }
+}
+
+/// A view through another part of each pixel.
+fn moved(view: &View, look: Look) -> View {
+    let shift = Vec2::new(-2.0, 2.0) * look.offset / view.size.max(UVec2::ONE).as_vec2();
+    // x + shift · w, whatever is seen.
+    let mut sheared = Mat4::IDENTITY;
+    sheared.w_axis.x = shift.x;
+    sheared.w_axis.y = shift.y;
+    View { clip_from_eye: sheared * view.clip_from_eye, ..*view }
 }
 
 /// One colour everywhere.
@@ -120,4 +325,21 @@ pub fn clear(encoder: &mut wgpu::CommandEncoder, target: &wgpu::TextureView, [r,
 pub fn onto(view: &wgpu::TextureView, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPassColorAttachment<'_> {
     let ops = wgpu::Operations { load, store: wgpu::StoreOp::Store };
     wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn a_view_moves_by_parts_of_pixels() {
+        let view = View::looking_at(DVec3::Z * 50.0, DVec3::new(90.0, 120.0, 10.0), 0.9, UVec2::new(80, 45));
+        let place = DVec3::new(80.0, 130.0, 12.0);
+        let offset = Vec2::new(0.25, -0.4);
+        let seen = moved(&view, Look { offset, number: 1 });
+        // What lies in the part that is looked through lies in the middle.
+        let by = view.pixel(place).expect("ahead") - seen.pixel(place).expect("ahead");
+        assert!(by.distance(offset) < 1e-4, "{by}");
+    }
 }

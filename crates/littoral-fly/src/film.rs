@@ -1,6 +1,7 @@
 //! A film along the path: a frame for each moment, each of them waited for, so that it is as smooth as the path however slow the machine is.
 
 use crate::cockpit::Cockpit;
+use crate::scene::Frame;
 use crate::tape::Tape;
 use glam::UVec2;
 use littoral_data::write::{Film, FilmSettings, FrameFolder, ffmpeg_installed};
@@ -61,8 +62,9 @@ impl Filming {
         if size != self.size {
             return Err("the window changed its size: the film ends here".into());
         }
-        let wanted = (cockpit.lod_view(size), cockpit.sea_time());
-        Ok(cockpit.scenery.is_some() && cockpit.frame.as_ref().is_some_and(|f| (f.view, f.time) == wanted))
+        let wanted = (cockpit.lod_view(size), cockpit.sea_time(), cockpit.second().is_some());
+        let come = |f: &Frame| (f.view, f.time, f.second.is_some()) == wanted;
+        Ok(cockpit.scenery.is_some() && cockpit.frame.as_ref().is_some_and(come))
     }
 
     /// Takes a frame. `true` after the last.

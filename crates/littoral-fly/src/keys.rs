@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use winit::keyboard::KeyCode;
 
 /// What is said of the keys: keys, and what they do.
-pub const HELP: [(&str, &str); 22] = [
+pub const HELP: [(&str, &str); 23] = [
     ("W S A D", "forward, back, left, right; on a boat: throttle and rudder; on an orbit: nearer, farther, round"),
     ("E Q", "up, down"),
     ("arrows, drag", "look round"),
@@ -14,6 +14,7 @@ pub const HELP: [(&str, &str); 22] = [
     ("1 2 3 4", "fly, orbit what is in the middle, walk, boat"),
     ("Home", "back to the first view"),
     ("M", "the next method of detail (Shift: the one before)"),
+    ("V", "one method, two side by side, how they differ"),
     ("+ -", "a finer, a coarser tolerance"),
     ("X", "textured, wireframe, both"),
     ("T", "the next style"),

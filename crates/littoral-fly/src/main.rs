@@ -4,19 +4,26 @@
 //! ([`window`]) draws the newest mesh with the newest view and waits for nobody. What both do is decided in [`cockpit`], which knows neither window nor
 //! graphics card; cameras, the path's editor and the settings are plain functions of their arguments.
 
+mod calendar;
 mod camera;
 mod chooser;
 mod cockpit;
+mod compare;
 mod draw;
 mod editor;
 mod film;
+#[cfg(feature = "gamepad")]
+mod gamepad;
 mod keys;
 mod paint;
 mod panel;
 mod plain;
 mod plots;
+mod rest;
 mod scene;
+mod seastate;
 mod settings;
+mod steering;
 mod subject;
 mod tape;
 mod window;
@@ -24,7 +31,8 @@ mod window;
 use camera::Mode;
 use clap::Parser;
 use glam::UVec2;
-use settings::{Method, Settings, Show, Style};
+use littoral::lod::Method;
+use settings::{Detail, Settings, Show, Split, Style};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -43,6 +51,7 @@ use std::process::ExitCode;
   littoral-fly N45W122.hgt N46W122.hgt         files that join, as one land
   littoral-fly dem.tif --path round.toml       along a path that was saved
   littoral-fly --method roam --show both       a method of detail at work
+  littoral-fly --method strips --against whole two methods, and how far apart their pictures are
   littoral-fly --sea beaufort=8,from=240 --mode boat
   littoral-fly --smoke 200 --size 1280x720     fly 200 frames, print the medians as JSON
 
@@ -61,7 +70,7 @@ struct Arguments {
     #[arg(long, value_name = "FILE.toml")]
     path: Option<PathBuf>,
     /// The method of detail
-    #[arg(long, value_parser = named::<Method>, value_name = "whole|nested|quadtree|patches|strips|roam")]
+    #[arg(long, value_name = "whole|nested|quadtree|patches|strips|roam")]
     method: Option<Method>,
     /// How far from its place the mesh may be drawn, in pixels
     #[arg(long, value_name = "PIXELS", value_parser = tolerance)]
@@ -69,6 +78,12 @@ struct Arguments {
     /// The most triangles of the ground, and as many of the sea
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1000..=20_000_000))]
     triangles: Option<u32>,
+    /// How long a frame may take, in milliseconds: the tolerance follows; 0 for as long as it takes
+    #[arg(long, value_name = "MS", value_parser = budget)]
+    budget: Option<f64>,
+    /// Another method beside it, as fine and with as many triangles: two pictures of the same view, and how far apart they are
+    #[arg(long, value_name = "METHOD")]
+    against: Option<Method>,
     /// How the picture is drawn: in the light of the data, or as the triangles themselves
     #[arg(long, value_parser = named::<Style>, value_name = "natural|plain")]
     style: Option<Style>,
@@ -106,6 +121,12 @@ fn tolerance(text: &str) -> Result<f64, String> {
     text.trim().parse().ok().filter(|t| (0.05..=100.0).contains(t)).ok_or_else(wrong)
 }
 
+/// A budget of time in milliseconds.
+fn budget(text: &str) -> Result<f64, String> {
+    let wrong = || format!("expected 0 to 10000 milliseconds, got \"{}\"", text.trim());
+    text.trim().parse().ok().filter(|t| (0.0..=10_000.0).contains(t)).ok_or_else(wrong)
+}
+
 /// A name, as the settings' file has it.
 fn named<T: serde::de::DeserializeOwned>(text: &str) -> Result<T, String> {
     let name = text.trim().to_lowercase();
@@ -124,9 +145,14 @@ impl Arguments {
             Some(file) => Settings::load(&file),
             None => (Settings::default(), None),
         };
-        settings.method = self.method.unwrap_or(settings.method);
-        settings.tolerance_pixels = self.tolerance.unwrap_or(settings.tolerance_pixels);
-        settings.triangles = self.triangles.unwrap_or(settings.triangles);
+        let first = &mut settings.first;
+        first.method = self.method.unwrap_or(first.method);
+        first.tolerance_pixels = self.tolerance.unwrap_or(first.tolerance_pixels);
+        first.triangles = self.triangles.unwrap_or(first.triangles);
+        settings.budget_milliseconds = self.budget.unwrap_or(settings.budget_milliseconds);
+        if let Some(method) = self.against {
+            (settings.second, settings.split) = (Detail { method, ..*first }, Split::Halves);
+        }
         settings.style = self.style.unwrap_or(settings.style);
         settings.coarse = self.coarse.unwrap_or(settings.coarse);
         settings.show = self.show.unwrap_or(settings.show);
@@ -166,18 +192,36 @@ mod tests {
     #[test]
     fn the_command_line_holds_together() {
         Arguments::command().debug_assert();
-        let arguments =
-            Arguments::try_parse_from(["littoral-fly", "--method", "Roam", "--smoke", "5", "--sea", "calm"]);
+        let arguments = Arguments::try_parse_from([
+            "littoral-fly",
+            "--method",
+            "Roam",
+            "--against",
+            "whole",
+            "--smoke",
+            "5",
+            "--sea",
+            "calm",
+        ]);
         let (settings, note) = arguments.expect("parses").settings();
         assert_eq!(
             settings,
-            Settings { method: Method::Roam, waves: false, sea: "calm".into(), ..Settings::default() }
+            Settings {
+                first: Detail { method: Method::Roam, ..Detail::default() },
+                second: Detail { method: Method::Whole, ..Detail::default() },
+                split: Split::Halves,
+                waves: false,
+                sea: "calm".into(),
+                ..Settings::default()
+            }
         );
         assert_eq!(note, None);
-        for wrong in [["--method", "rome"], ["--size", "7"], ["--tolerance", "0"], ["--smoke", "0"]] {
+        for wrong in
+            [["--method", "rome"], ["--size", "7"], ["--tolerance", "0"], ["--budget", "nan"], ["--smoke", "0"]]
+        {
             let error = Arguments::try_parse_from(["littoral-fly", wrong[0], wrong[1]]).map(|_| ()).expect_err("wrong");
             assert!(error.to_string().contains(wrong[1]), "{error}");
         }
-        assert!(named::<Method>("rome").is_err_and(|e| e.contains("roam")));
+        assert!(named::<Style>("rome").is_err_and(|e| e.contains("plain")));
     }
 }

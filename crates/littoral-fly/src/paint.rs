@@ -1,8 +1,8 @@
 //! The window's surface: the picture, the panel over it, and copies of both.
 
 use crate::cockpit::Cockpit;
-use crate::draw;
-use crate::settings::Settings;
+use crate::compare::Difference;
+use crate::draw::{self, Seen};
 use glam::UVec2;
 use littoral_gpu::Gpu;
 use std::sync::Arc;
@@ -84,8 +84,8 @@ impl Paint {
         }
     }
 
-    /// Paints the window.
-    pub fn show(&mut self, cockpit: &Cockpit, gui: &Gui) -> Result<(), Missed> {
+    /// Paints the window. `true` where its picture rests.
+    pub fn show(&mut self, cockpit: &Cockpit, gui: &Gui) -> Result<bool, Missed> {
         use wgpu::CurrentSurfaceTexture as Current;
         self.gpu.check().map_err(|e| Missed::Lost(e.to_string()))?;
         let texture = match self.surface.get_current_texture() {
@@ -100,10 +100,18 @@ impl Paint {
             }
         };
         let target = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
-        self.picture(cockpit, &target, cockpit.settings.coarse);
+        let rests = match self.seen(cockpit) {
+            Some(seen) => self.renderer.show(&self.gpu, &seen, &target),
+            None => self.nothing(&target),
+        };
         self.over(gui, &target);
         self.gpu.queue.present(texture);
-        Ok(())
+        Ok(rests)
+    }
+
+    /// How far apart the two pictures were that were shown last.
+    pub fn difference(&self) -> Option<Difference> {
+        self.renderer.difference()
     }
 
     /// Takes what changed of egui's textures: once for each run of it, painted or not.
@@ -133,24 +141,34 @@ impl Paint {
             view_formats: &[],
         });
         let target = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        self.picture(cockpit, &target, 1);
+        match self.seen(cockpit) {
+            Some(seen) => self.renderer.copy(&self.gpu, &seen, &target),
+            None => _ = self.nothing(&target),
+        }
         if let Some(gui) = gui {
             self.over(gui, &target);
         }
-        self.pixels(&texture)
+        pixels(&self.gpu, &texture)
     }
 
-    fn picture(&mut self, cockpit: &Cockpit, target: &wgpu::TextureView, coarse: u32) {
-        let size = self.size();
-        if let (Some(scenery), Some(frame)) = (&cockpit.scenery, &cockpit.frame) {
-            let view = |size| cockpit.view(size);
-            let settings = Settings { coarse, ..cockpit.settings.clone() };
-            return self.renderer.draw(&self.gpu, scenery, frame, &settings, cockpit.grey(), &view, target, size);
-        }
-        // Nothing to see yet.
+    /// What is to be seen, as soon as there is something.
+    fn seen<'a>(&self, cockpit: &'a Cockpit) -> Option<Seen<'a>> {
+        Some(Seen {
+            scenery: cockpit.scenery.as_ref()?,
+            frame: cockpit.frame.as_ref()?,
+            settings: &cockpit.settings,
+            grey: cockpit.grey(),
+            view: cockpit.view(self.size()),
+            divider: cockpit.divider,
+        })
+    }
+
+    /// Nothing to see yet.
+    fn nothing(&self, target: &wgpu::TextureView) -> bool {
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         draw::clear(&mut encoder, target, [0.16, 0.20, 0.24]);
         self.gpu.queue.submit([encoder.finish()]);
+        false
     }
 
     /// Paints the panel.
@@ -169,32 +187,29 @@ impl Paint {
         commands.push(encoder.finish());
         queue.submit(commands);
     }
+}
 
-    /// What a texture holds.
-    fn pixels(&self, texture: &wgpu::Texture) -> Result<Vec<[u8; 3]>, String> {
-        let size = texture.size();
-        let row = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("copy"),
-            size: u64::from(row) * u64::from(size.height),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let layout =
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(size.height) };
-        let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-        encoder.copy_texture_to_buffer(texture.as_image_copy(), into, size);
-        self.gpu.queue.submit([encoder.finish()]);
-        buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-        let problem =
-            |e: &dyn std::fmt::Display| format!("the picture could not be read back from the graphics card: {e}");
-        self.gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| problem(&e))?;
-        let bytes = buffer.slice(..).get_mapped_range().map_err(|e| problem(&e))?;
-        let blue_first =
-            matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
-        let colour = |p: &[u8]| if blue_first { [p[2], p[1], p[0]] } else { [p[0], p[1], p[2]] };
-        let lines = bytes.chunks_exact(row as usize);
-        Ok(lines.flat_map(|line| line[..4 * size.width as usize].chunks_exact(4).map(colour)).collect())
-    }
+/// What a texture holds: red, green and blue, row by row.
+pub fn pixels(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<[u8; 3]>, String> {
+    let size = texture.size();
+    let row = (4 * size.width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("copy"),
+        size: u64::from(row) * u64::from(size.height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: Some(size.height) };
+    let into = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), into, size);
+    gpu.queue.submit([encoder.finish()]);
+    buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    let problem = |e: &dyn std::fmt::Display| format!("the picture could not be read back from the graphics card: {e}");
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| problem(&e))?;
+    let bytes = buffer.slice(..).get_mapped_range().map_err(|e| problem(&e))?;
+    let blue_first = matches!(texture.format(), wgpu::TextureFormat::Bgra8Unorm | wgpu::TextureFormat::Bgra8UnormSrgb);
+    let colour = |p: &[u8]| if blue_first { [p[2], p[1], p[0]] } else { [p[0], p[1], p[2]] };
+    let lines = bytes.chunks_exact(row as usize);
+    Ok(lines.flat_map(|line| line[..4 * size.width as usize].chunks_exact(4).map(colour)).collect())
 }

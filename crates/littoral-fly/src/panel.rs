@@ -1,13 +1,20 @@
 //! The panel: what can be changed, and the numbers.
 
+use crate::calendar;
 use crate::camera::Mode;
 use crate::cockpit::{Cockpit, median};
+use crate::compare::Difference;
 use crate::keys;
 use crate::plots;
-use crate::settings::{Method, Show, Style};
+use crate::scene::Choice;
+use crate::seastate;
+use crate::settings::{Detail, Settings, Show, Split, Style, SunBy};
+use crate::steering::Steering;
 use egui::{Align2, Color32, DragValue, RichText, Slider, TextEdit, Ui};
-use glam::{DVec3, UVec2, Vec2};
+use glam::{DVec2, DVec3, UVec2, Vec2};
 use littoral::flight::{Interpolation, Level, Pace};
+use littoral::lod::Method;
+use littoral::picture::Sun;
 use std::path::Path;
 
 /// What the panel asks of the window.
@@ -35,6 +42,9 @@ pub struct Shown {
 /// Everything over the picture.
 pub fn show(ui: &mut Ui, cockpit: &mut Cockpit, shown: &mut Shown, size: UVec2, asks: &mut Vec<Ask>) {
     overlay(ui, cockpit, size);
+    if cockpit.settings.split == Split::Halves {
+        divider(ui, cockpit);
+    }
     status(ui, cockpit);
     if cockpit.settings.panel {
         let frame = egui::Frame::side_top_panel(ui.style()).fill(Color32::from_black_alpha(215));
@@ -53,6 +63,34 @@ pub fn show(ui: &mut Ui, cockpit: &mut Cockpit, shown: &mut Shown, size: UVec2, 
     if shown.help {
         help(ui, shown);
     }
+}
+
+/// The line between two pictures: its handle can be dragged.
+fn divider(ui: &Ui, cockpit: &mut Cockpit) {
+    let screen = ui.ctx().content_rect();
+    let names = cockpit.frame.as_ref().map(|f| (f.first.detail.method, f.second.as_ref().map(|s| s.detail.method)));
+    let middle = egui::pos2(screen.left() + cockpit.divider * screen.width(), screen.center().y);
+    let area = egui::Area::new(egui::Id::unique("divider")).fixed_pos(middle).pivot(Align2::CENTER_CENTER);
+    area.show(ui.ctx(), |ui| {
+        let (rect, response) = ui.allocate_exact_size(egui::vec2(18.0, 56.0), egui::Sense::drag());
+        let colour = if response.hovered() || response.dragged() { Color32::WHITE } else { Color32::from_gray(200) };
+        ui.painter().rect_filled(rect, 6.0, Color32::from_black_alpha(160));
+        let font = egui::FontId::proportional(16.0);
+        for x in [-3.0, 0.0, 3.0] {
+            let at = rect.center() + egui::vec2(x, 0.0);
+            ui.painter().vline(at.x, at.y - 10.0..=at.y + 10.0, egui::Stroke::new(1.0, colour));
+        }
+        if let Some((first, Some(second))) = names {
+            let painter = ui.ctx().layer_painter(egui::LayerId::background());
+            for (name, at, align) in [(first, -14.0, Align2::RIGHT_TOP), (second, 14.0, Align2::LEFT_TOP)] {
+                let at = egui::pos2(middle.x + at, screen.top() + 12.0);
+                painter.text(at + egui::vec2(1.0, 1.0), align, name.name(), font.clone(), Color32::BLACK);
+                painter.text(at, align, name.name(), font.clone(), Color32::WHITE);
+            }
+        }
+        cockpit.divider = (cockpit.divider + response.drag_delta().x / screen.width().max(1.0)).clamp(0.02, 0.98);
+        response.on_hover_cursor(egui::CursorIcon::ResizeHorizontal);
+    });
 }
 
 fn banner(ui: &Ui, id: &str, at: egui::Pos2, text: &str, done: f32) {
@@ -89,9 +127,13 @@ fn help(ui: &Ui, shown: &mut Shown) {
         ui.ctx(),
         |ui| {
             egui::Grid::new("keys").num_columns(2).spacing([24.0, 5.0]).show(ui, |ui| {
-                for (keys, does) in keys::HELP {
-                    ui.label(RichText::new(keys).strong());
-                    ui.label(does);
+                #[cfg(feature = "gamepad")]
+                let pad = &crate::gamepad::HELP[..];
+                #[cfg(not(feature = "gamepad"))]
+                let pad = &[];
+                for (keys, does) in keys::HELP.iter().chain(pad) {
+                    ui.label(RichText::new(*keys).strong());
+                    ui.label(*does);
                     ui.end_row();
                 }
             });
@@ -111,9 +153,10 @@ fn status(ui: &mut Ui, cockpit: &Cockpit) {
             let milliseconds = median(history.frame.iter().rev().take(12).copied());
             ui.label(format!("{:.0} frames/s", if milliseconds > 0.0 { 1000.0 / milliseconds } else { 0.0 }));
             if let Some(frame) = &cockpit.frame {
-                ui.label(format!("{} in {:.1} ms", cockpit.settings.method.words().0, frame.milliseconds));
-                ui.label(format!("{} triangles", thousands(frame.triangles())));
-                for (what, reached) in [("ground", Some(frame.ground_reached)), ("sea", frame.water_reached)] {
+                let first = &frame.first;
+                ui.label(format!("{} in {:.1} ms", first.detail.method, first.milliseconds));
+                ui.label(format!("{} triangles", thousands(first.triangles())));
+                for (what, reached) in [("ground", Some(first.ground_reached)), ("sea", first.water_reached)] {
                     let Some(reached) = reached else { continue };
                     let bound = format!("{what} within {:.2} px", reached.pixels);
                     match reached.limited {
@@ -185,18 +228,35 @@ fn section(ui: &mut Ui, title: &str, open: bool, content: impl FnOnce(&mut Ui)) 
 fn detail(ui: &mut Ui, cockpit: &mut Cockpit, asks: &mut Vec<Ask>) {
     section(ui, "Detail", true, |ui| {
         let settings = &mut cockpit.settings;
-        let mut method = settings.method;
-        egui::ComboBox::from_id_salt("method").selected_text(method.words().0).show_ui(ui, |ui| {
-            for each in Method::ALL {
-                let (name, does) = each.words();
-                ui.selectable_value(&mut method, each, name).on_hover_text(does);
+        let steered = cockpit.steering.as_ref();
+        ui.push_id("first", |ui| choice(ui, &mut settings.first, steered.map(Steering::tolerance)));
+        ui.horizontal(|ui| {
+            let mut limited = settings.budget_milliseconds > 0.0;
+            if ui.checkbox(&mut limited, "time for a frame").changed() {
+                settings.budget_milliseconds = if limited { 20.0 } else { 0.0 };
+            }
+            if limited {
+                ui.add(DragValue::new(&mut settings.budget_milliseconds).range(1.0..=10_000.0).suffix(" ms"));
+            }
+        })
+        .response
+        .on_hover_text("The tolerance follows: frames become as fine as this time allows");
+        if steered.is_some_and(|steering| steering.short) {
+            ui.colored_label(Color32::ORANGE, "fewer triangles alone cannot keep it");
+        }
+        ui.horizontal(|ui| {
+            for each in Split::ALL {
+                ui.selectable_value(&mut settings.split, each, each.words().0).on_hover_text(each.words().1);
             }
         });
-        settings.method = method;
-        ui.label(RichText::new(method.words().1).weak().small());
-        let tolerance = Slider::new(&mut settings.tolerance_pixels, 0.1..=50.0).logarithmic(true);
-        ui.add(tolerance.custom_formatter(|n, _| format!("{n:.2}")).text("px tolerance"));
-        ui.add(Slider::new(&mut settings.triangles, 1000..=5_000_000).logarithmic(true).text("most triangles"));
+        if settings.split != Split::Off {
+            if settings.split == Split::Difference {
+                ui.add(Slider::new(&mut settings.gain, 1.0..=64.0).logarithmic(true).text("× amplified"));
+            }
+            ui.push_id("second", |ui| choice(ui, &mut settings.second, None));
+            let (frame, difference) = (&cockpit.frame, cockpit.difference);
+            compared(ui, frame.as_ref().and_then(|f| Some((&f.first, f.second.as_ref()?))), difference);
+        }
         ui.horizontal(|ui| {
             for each in Style::ALL {
                 ui.selectable_value(&mut settings.style, each, each.words().0).on_hover_text(each.words().1);
@@ -212,6 +272,43 @@ fn detail(ui: &mut Ui, cockpit: &mut Cockpit, asks: &mut Vec<Ask>) {
             asks.push(Ask::Freeze);
         }
     });
+}
+
+/// A method, and how finely it draws. `steered` is the tolerance (pixels) that a budget of time has set.
+fn choice(ui: &mut Ui, detail: &mut Detail, steered: Option<f64>) {
+    egui::ComboBox::from_id_salt("method").selected_text(detail.method.name()).show_ui(ui, |ui| {
+        for each in Method::ALL {
+            ui.selectable_value(&mut detail.method, each, each.name()).on_hover_text(each.description());
+        }
+    });
+    ui.label(RichText::new(detail.method.description()).weak().small());
+    let mut tolerance = steered.unwrap_or(detail.tolerance_pixels);
+    let slider = Slider::new(&mut tolerance, 0.1..=50.0).logarithmic(true).custom_formatter(|n, _| format!("{n:.2}"));
+    if ui.add_enabled(steered.is_none(), slider.text("px tolerance")).changed() {
+        detail.tolerance_pixels = tolerance;
+    }
+    ui.add(Slider::new(&mut detail.triangles, 1000..=5_000_000).logarithmic(true).text("most triangles"));
+}
+
+/// Two methods in figures.
+fn compared(ui: &mut Ui, choices: Option<(&Choice, &Choice)>, difference: Option<Difference>) {
+    let Some((first, second)) = choices else { return };
+    egui::Grid::new("compared").num_columns(3).spacing([10.0, 2.0]).show(ui, |ui| {
+        for each in [first, second] {
+            ui.label(RichText::new(each.detail.method.name()).small());
+            ui.label(RichText::new(format!("{} triangles", thousands(each.triangles()))).small());
+            let words = format!("{:.2} px, {:.1} ms", each.ground_reached.pixels, each.milliseconds);
+            ui.label(RichText::new(words).small());
+            ui.end_row();
+        }
+    });
+    if let Some(Difference { mean, largest, off }) = difference {
+        let words = format!(
+            "{mean:.2} of 255 apart in the mean, {largest} at most; {:.2} % of pixels by more than 24",
+            100.0 * off
+        );
+        ui.label(RichText::new(words).small());
+    }
 }
 
 fn moving(ui: &mut Ui, cockpit: &mut Cockpit) {
@@ -233,17 +330,8 @@ fn moving(ui: &mut Ui, cockpit: &mut Cockpit) {
 
 fn look(ui: &mut Ui, cockpit: &mut Cockpit) {
     section(ui, "Light and colours", false, |ui| {
-        let own_sun = cockpit.own_sun();
+        sun(ui, cockpit);
         let settings = &mut cockpit.settings;
-        if ui.checkbox(&mut settings.own_sun, "The sun where it suits the land").changed()
-            && let Some(sun) = own_sun.filter(|_| !settings.own_sun)
-        {
-            (settings.sun_azimuth_degrees, settings.sun_elevation_degrees) = (sun.x.round(), sun.y.round());
-        }
-        ui.add_enabled_ui(!settings.own_sun, |ui| {
-            ui.add(Slider::new(&mut settings.sun_azimuth_degrees, 0.0..=360.0).step_by(1.0).text("° sun's bearing"));
-            ui.add(Slider::new(&mut settings.sun_elevation_degrees, -10.0..=90.0).step_by(0.5).text("° sun's height"));
-        });
         let visibility = Slider::new(&mut settings.visibility_kilometres, 0.0..=300.0).step_by(1.0);
         let words = |n: f64, _| if n == 0.0 { "as suits".to_owned() } else { format!("{n:.0} km") };
         ui.add(visibility.custom_formatter(words).text("visibility"));
@@ -263,6 +351,62 @@ fn look(ui: &mut Ui, cockpit: &mut Cockpit) {
     });
 }
 
+fn sun(ui: &mut Ui, cockpit: &mut Cockpit) {
+    ui.horizontal(|ui| {
+        ui.label("Sun");
+        for each in SunBy::ALL {
+            let before = cockpit.sun().map(|sun| DVec2::new(sun.azimuth, sun.elevation).map(f64::to_degrees));
+            let before = before.or(cockpit.own_sun());
+            let (name, does) = each.words();
+            let chosen = ui.selectable_value(&mut cockpit.settings.sun, each, name).on_hover_text(does);
+            // A hand takes the sun from where it stands.
+            if let (true, SunBy::Hand, Some(sun)) = (chosen.changed(), each, before) {
+                let settings = &mut cockpit.settings;
+                (settings.sun_azimuth_degrees, settings.sun_elevation_degrees) =
+                    (sun.x.rem_euclid(360.0).round(), sun.y.clamp(-10.0, 90.0).round());
+            }
+        }
+    });
+    let known = cockpit.subject.as_ref().and_then(|subject| subject.lonlat());
+    let now = cockpit.sun();
+    let settings = &mut cockpit.settings;
+    match settings.sun {
+        SunBy::Land => {}
+        SunBy::Hand => {
+            ui.add(Slider::new(&mut settings.sun_azimuth_degrees, 0.0..=360.0).step_by(1.0).text("° sun's bearing"));
+            ui.add(Slider::new(&mut settings.sun_elevation_degrees, -10.0..=90.0).step_by(0.5).text("° sun's height"));
+        }
+        SunBy::Date => {
+            let year = settings.year;
+            let day = Slider::new(&mut settings.day, 1..=calendar::day(year, u16::MAX).day_of_year().unsigned_abs());
+            ui.add(day.custom_formatter(move |n, _| calendar::day_words(year, n as u16)).text("day"));
+            let clock = |hour: f64, _| format!("{:.0}:{:02.0}", hour.floor(), (hour.fract() * 60.0).floor());
+            let hour = Slider::new(&mut settings.hour, 0.0..=24.0).step_by(1.0 / 12.0).custom_formatter(clock);
+            ui.add(hour.text("hour")).on_hover_text("By the sun of that place: at 12 it stands about highest");
+            ui.horizontal(|ui| {
+                ui.add(DragValue::new(&mut settings.year).range(calendar::YEARS).prefix("year "));
+                if known.is_none() {
+                    let degrees = |value, most: f64, name| {
+                        DragValue::new(value).range(-most..=most).speed(0.1).max_decimals(2).prefix(name).suffix("°")
+                    };
+                    ui.add(degrees(&mut settings.latitude_degrees, 90.0, "north "));
+                    ui.add(degrees(&mut settings.longitude_degrees, 180.0, "east "));
+                }
+            });
+            ui.label(RichText::new(sun_words(settings, calendar::place(settings, known), now)).weak().small());
+        }
+    }
+}
+
+/// Which instant the sun by date is of, and where it stands.
+fn sun_words(settings: &Settings, place: DVec2, sun: Option<Sun>) -> String {
+    let stands = sun.map_or(String::new(), |sun| {
+        let [bearing, height] = [sun.azimuth, sun.elevation].map(f64::to_degrees);
+        format!(": bearing {bearing:.0}°, {height:.1}° high")
+    });
+    format!("{} at {:.2}° N, {:.2}° E{stands}", calendar::utc_words(settings, place), place.y, place.x)
+}
+
 fn sea(ui: &mut Ui, cockpit: &mut Cockpit) {
     section(ui, "Sea", true, |ui| {
         ui.checkbox(&mut cockpit.settings.waves, "Waves");
@@ -273,6 +417,7 @@ fn sea(ui: &mut Ui, cockpit: &mut Cockpit) {
             if field.lost_focus() {
                 cockpit.settings.sea = cockpit.sea_text.trim().to_owned();
             }
+            wind(ui, cockpit);
             ui.horizontal_wrapped(|ui| {
                 for (name, text) in [
                     ("Breeze", "beaufort=4,from=225"),
@@ -287,12 +432,28 @@ fn sea(ui: &mut Ui, cockpit: &mut Cockpit) {
                 ui.checkbox(&mut cockpit.still, "stand still");
             });
             ui.label(RichText::new(format!("at {:.1} s", cockpit.time)).weak());
-            if cockpit.settings.style == Style::Natural {
-                let words = "Waves carry the boat; they are seen in plain pictures only (Detail).";
+            if !cockpit.still && cockpit.settings.style == Style::Natural {
+                let words = "Pictures get clean at rest while the sea stands still (Space).";
                 ui.label(RichText::new(words).weak().small());
             }
         });
     });
+}
+
+/// The wind of the sea's state, as far as its words have one; the sea is made anew when a slider is let go.
+fn wind(ui: &mut Ui, cockpit: &mut Cockpit) {
+    let speeds = [("wind", "m/s wind", 0.5, 35.0, 0.5), ("beaufort", "Beaufort", 0.0, 12.0, 1.0)];
+    let directions = [("from", "° it blows from", 0.0, 360.0, 5.0)];
+    for (key, name, low, high, step) in speeds.into_iter().chain(directions) {
+        let Some(mut value) = seastate::number(&cockpit.sea_text, key) else { continue };
+        let slider = ui.add(Slider::new(&mut value, low..=high).step_by(step).text(name));
+        if slider.changed() {
+            cockpit.sea_text = seastate::with(&cockpit.sea_text, key, value);
+        }
+        if slider.drag_stopped() || slider.lost_focus() || (slider.changed() && !slider.dragged()) {
+            cockpit.settings.sea = cockpit.sea_text.clone();
+        }
+    }
 }
 
 fn path(ui: &mut Ui, cockpit: &mut Cockpit, shown: &Shown, asks: &mut Vec<Ask>) {

@@ -8,11 +8,11 @@
 use crate::chooser::Chooser;
 use crate::draw::Scenery;
 use crate::plain::sea_datum;
-use crate::settings::Method;
+use crate::settings::Detail;
 use crate::subject::{Order, Subject};
 use glam::{DVec2, UVec2};
 use littoral::field::Sea;
-use littoral::lod::{Mesh, NestedBounds, Reached};
+use littoral::lod::{Mesh, NestedBounds, Reached, ViewError};
 use littoral::picture::{self, Air, Border, Climate, Scene, Shot, Stage, Sun};
 use littoral::space::View;
 use littoral::waves::SeaState;
@@ -42,10 +42,10 @@ pub struct Wish {
     /// The sea's state as typed; `None` for still water.
     pub sea: Option<String>,
     /// How triangles are chosen.
-    pub method: Method,
-    /// The most of them, of the ground and of the sea.
-    pub triangles: usize,
-    /// For which view, with its tolerance.
+    pub first: Detail,
+    /// How triangles of a second picture are, if there is one.
+    pub second: Option<Detail>,
+    /// For which view; how finely is the details' business.
     pub view: View,
     /// What the eye sees, in a picture of any size.
     pub eye: View,
@@ -55,6 +55,30 @@ pub struct Wish {
     pub time: f64,
     /// Where the water's height is asked for.
     pub probes: Option<[DVec2; 4]>,
+}
+
+/// What a method chose.
+#[derive(Debug)]
+pub struct Choice {
+    /// How.
+    pub detail: Detail,
+    /// The ground.
+    pub ground: Mesh,
+    /// The water.
+    pub water: Option<Mesh>,
+    /// How well the ground is drawn.
+    pub ground_reached: Reached,
+    /// How well the water is drawn.
+    pub water_reached: Option<Reached>,
+    /// How long the choice took (ms).
+    pub milliseconds: f64,
+}
+
+impl Choice {
+    /// Triangles of ground and water.
+    pub fn triangles(&self) -> usize {
+        self.ground.triangles.len() + self.water.as_ref().map_or(0, |water| water.triangles.len())
+    }
 }
 
 /// Meshes for a wish.
@@ -68,27 +92,14 @@ pub struct Frame {
     pub view: View,
     /// The instant of the sea (s).
     pub time: f64,
-    /// The ground.
-    pub ground: Mesh,
-    /// The water.
-    pub water: Option<Mesh>,
-    /// How well the ground is drawn.
-    pub ground_reached: Reached,
-    /// How well the water is drawn.
-    pub water_reached: Option<Reached>,
+    /// The meshes.
+    pub first: Choice,
+    /// Those of a second picture.
+    pub second: Option<Choice>,
     /// The radiance that an eye there would take for middle grey (kcd/m²).
     pub grey: f32,
-    /// How long the choice took (ms).
-    pub milliseconds: f64,
     /// Heights of the water (m) at the wish's probes.
     pub heights: Option<[f64; 4]>,
-}
-
-impl Frame {
-    /// Triangles of ground and water.
-    pub fn triangles(&self) -> usize {
-        self.ground.triangles.len() + self.water.as_ref().map_or(0, |water| water.triangles.len())
-    }
 }
 
 /// What the scene tells the window.
@@ -292,8 +303,11 @@ fn fly(
             // How long the last sky took, and when it was done.
             let mut sky = (Duration::ZERO, Instant::now());
             let mut still = subject.water.as_ref().map(|water| Sea::new(sea_datum(&subject.land), water.level));
-            let mut chooser = Chooser::new(stage.land(), &bounds, wish.method, wish.triangles);
+            let mut first = Chooser::new(stage.land(), &bounds, wish.first);
+            let mut second: Option<Chooser> = None;
             let mut answered: Option<Wish> = None;
+            // Which waves natural pictures show: whether any, and of which instant (s).
+            let mut seen = (false, f64::NAN);
             loop {
                 if wish.look != look {
                     break;
@@ -323,7 +337,7 @@ fn fly(
                             "the waves could not be made (an internal error; please report it)".into(),
                         )),
                     }
-                    answered = None;
+                    (answered, seen) = (None, (false, f64::NAN));
                 }
                 // A sky takes long: no more than a quarter of the time is spent on skies.
                 if sky.1.elapsed() > 3 * sky.0 {
@@ -331,12 +345,22 @@ fn fly(
                     scenery.see_from(gpu, &stage, wish.eye.eye.z);
                     sky = (begun.elapsed(), Instant::now());
                 }
-                if answered.as_ref() != Some(&*wish) {
-                    chooser.follow(wish.method, wish.triangles);
+                // A view that rests is metered once more, where the last measurement was of another one.
+                if answered.as_ref() != Some(&*wish) || meter.wants(&wish.eye) {
+                    first.follow(wish.first);
+                    match (&mut second, wish.second) {
+                        (Some(second), Some(detail)) => second.follow(detail),
+                        (None, Some(detail)) => second = Some(Chooser::new(stage.land(), &bounds, detail)),
+                        (_, None) => second = None,
+                    }
                     let sea = waves.as_mut().or(still.as_mut()).filter(|_| stage.shows_waves());
                     number += 1;
                     let grey = meter.grey(&stage, &wish.eye);
-                    match frame(&mut chooser, sea, wish) {
+                    let made = frame(&mut first, second.as_mut(), sea, wish);
+                    if let Err(problem) = show_waves(&scenery, gpu, waves.as_ref(), &mut seen) {
+                        voice.tell(News::Note(problem));
+                    }
+                    match made {
                         Ok(frame) => voice.tell(News::Frame(Box::new(Frame { serial, number, grey, ..frame }))),
                         Err(problem) => voice.tell(News::Note(problem)),
                     }
@@ -356,7 +380,7 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
         Some(visibility) => Air { visibility, veils_distance: true },
         None => suits.air,
     };
-    let climate = subject.latitude().map_or_else(Climate::default, Climate::at_latitude);
+    let climate = subject.lonlat().map_or_else(Climate::default, |lonlat| Climate::at_latitude(lonlat.y.to_radians()));
     Scene {
         lakes: subject.lakes.as_ref(),
         sun: look.sun.unwrap_or(suits.sun),
@@ -386,19 +410,20 @@ fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Sea, String> {
 }
 
 /// The meshes that are wished for.
-fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish) -> Result<Frame, String> {
-    let started = Instant::now();
-    // Waves that nobody sees or feels cost nothing.
-    let sea = sea.filter(|_| wish.waves || wish.probes.is_some()).map(|sea| {
+fn frame(
+    first: &mut Chooser,
+    second: Option<&mut Chooser>,
+    sea: Option<&mut Sea>,
+    wish: &Wish,
+) -> Result<Frame, String> {
+    let sea = sea.map(|sea| {
         if sea.time() != wish.time {
             sea.set_time(wish.time);
         }
         &*sea
     });
-    let (ground, ground_reached) = chooser.ground(&wish.view).map_err(|e| e.to_string())?;
-    let water =
-        sea.filter(|_| wish.waves).map(|sea| chooser.water(sea, &wish.view)).transpose().map_err(|e| e.to_string())?;
-    let (water, water_reached) = water.unzip();
+    let waves = sea.filter(|_| wish.waves);
+    let chosen = |chooser: &mut Chooser| choose(chooser, waves, &wish.view).map_err(|e| e.to_string());
     let heights = sea.zip(wish.probes).map(|(sea, probes)| {
         let mut heights = [0.0; 4];
         sea.heights_at(&probes, &mut heights);
@@ -410,34 +435,64 @@ fn frame(chooser: &mut Chooser, sea: Option<&mut Sea>, wish: &Wish) -> Result<Fr
         grey: 0.0,
         view: wish.view,
         time: wish.time,
-        ground,
-        water,
-        ground_reached,
-        water_reached,
-        milliseconds: started.elapsed().as_secs_f64() * 1e3,
+        first: chosen(first)?,
+        second: second.map(chosen).transpose()?,
         heights,
     })
+}
+
+/// Brings the waves of a sea to natural pictures, as it stands now. `seen` is what they have shown so far: whether any, and of which instant (s).
+fn show_waves(scenery: &Scenery, gpu: &Gpu, sea: Option<&Sea>, seen: &mut (bool, f64)) -> Result<(), String> {
+    let now = (sea.is_some(), sea.map_or(f64::NAN, Sea::time));
+    let before = std::mem::replace(seen, now);
+    match sea {
+        Some(sea) if !before.0 => scenery.set_waves(gpu, Some(sea)),
+        Some(sea) if before.1 != now.1 => {
+            scenery.follow_waves(gpu, sea);
+            Ok(())
+        }
+        None if before.0 => scenery.set_waves(gpu, None),
+        _ => Ok(()),
+    }
+}
+
+/// What a method chooses for a view.
+fn choose(chooser: &mut Chooser, sea: Option<&Sea>, view: &View) -> Result<Choice, ViewError> {
+    let started = Instant::now();
+    let detail = chooser.detail();
+    let view = View { tolerance_pixels: detail.tolerance_pixels as f32, ..*view };
+    let (ground, ground_reached) = chooser.ground(&view)?;
+    let (water, water_reached) = sea.map(|sea| chooser.water(sea, &view)).transpose()?.unzip();
+    let milliseconds = started.elapsed().as_secs_f64() * 1e3;
+    Ok(Choice { detail, ground, water, ground_reached, water_reached, milliseconds })
 }
 
 /// Meters the light, as a photographer does: by a small picture of what is seen, now and then.
 #[derive(Default)]
 struct Meter {
-    last: Option<(f32, Instant)>,
+    last: Option<(f32, View, Instant)>,
 }
 
 impl Meter {
+    /// Measurements are so far apart.
+    const EVERY: Duration = Duration::from_millis(900);
+
+    /// Whether it is time for another measurement, and another view than the last one's.
+    fn wants(&self, eye: &View) -> bool {
+        self.last.as_ref().is_none_or(|(_, of, when)| of != eye && when.elapsed() >= Meter::EVERY)
+    }
+
     /// The radiance of middle grey (kcd/m²).
     fn grey(&mut self, stage: &Stage<'_>, eye: &View) -> f32 {
         const SIZE: UVec2 = UVec2::new(48, 27);
-        const EVERY: Duration = Duration::from_millis(900);
         match self.last {
-            Some((grey, when)) if when.elapsed() < EVERY => grey,
+            Some((grey, ..)) if !self.wants(eye) => grey,
             _ => {
                 let pixels_per_radian = eye.pixels_per_radian * SIZE.y as f32 / eye.size.y.max(1) as f32;
                 let small = View { size: SIZE, pixels_per_radian, ..*eye };
                 let settings = picture::Settings { samples: 1, passes: false, ..picture::Settings::default() };
                 let grey = stage.render(&small, &settings, &|_| {}).grey().max(1e-6);
-                self.last = Some((grey, Instant::now()));
+                self.last = Some((grey, *eye, Instant::now()));
                 grey
             }
         }

@@ -1,60 +1,9 @@
 //! What is remembered from one flight to the next: a readable file in the user's folder for settings.
 
 use crate::camera::Mode;
-use littoral::lod::{Limits, Lod, Nested, Patches, Quadtree, Roam, Strips, Whole};
+use littoral::lod::Method;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-
-/// A method of detail.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Everything equally fine.
-    Whole,
-    /// Nested square windows.
-    Nested,
-    /// A restricted quadtree whose patches morph.
-    #[default]
-    Quadtree,
-    /// Triangles cut level by level.
-    Patches,
-    /// Strips along rows.
-    Strips,
-    /// A bintree of right triangles, which goes on from frame to frame.
-    Roam,
-}
-
-impl Method {
-    /// All of them.
-    pub const ALL: [Method; 6] =
-        [Method::Whole, Method::Nested, Method::Quadtree, Method::Patches, Method::Strips, Method::Roam];
-
-    /// What it is called, and what it does.
-    pub fn words(self) -> (&'static str, &'static str) {
-        match self {
-            Method::Whole => ("Whole", "Everything equally fine: what the others are measured by"),
-            Method::Nested => ("Nested", "Square windows within each other, joined by upright strips: for seas"),
-            Method::Quadtree => ("Quadtree", "A restricted quadtree whose patches morph"),
-            Method::Patches => ("Patches", "Triangles cut level by level, edges deciding"),
-            Method::Strips => ("Strips", "Strips along rows whose cells change size on the way"),
-            Method::Roam => {
-                ("ROAM", "A bintree of right triangles, the worst split first; it goes on from frame to frame")
-            }
-        }
-    }
-
-    /// The method within limits.
-    pub fn within(self, limits: Limits) -> Box<dyn Lod> {
-        match self {
-            Method::Whole => Box::new(Whole::new(limits)),
-            Method::Nested => Box::new(Nested::new(limits)),
-            Method::Quadtree => Box::new(Quadtree::new(limits)),
-            Method::Patches => Box::new(Patches::new(limits)),
-            Method::Strips => Box::new(Strips::new(limits)),
-            Method::Roam => Box::new(Roam::new(limits)),
-        }
-    }
-}
 
 /// How the picture is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,9 +23,7 @@ impl Style {
     /// What it is called, and what it does.
     pub fn words(self) -> (&'static str, &'static str) {
         match self {
-            Style::Natural => {
-                ("Natural", "Rock, scree, grass, woods, sand and snow in the light of the day; water lies still")
-            }
+            Style::Natural => ("Natural", "Rock, scree, grass, woods, sand, snow and the sea in the light of the day"),
             Style::Plain => {
                 ("Plain", "The triangles themselves, flatly lit, waves as well: quick without a graphics card")
             }
@@ -111,30 +58,107 @@ impl Show {
     }
 }
 
+/// Which pictures are shown of two methods.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Split {
+    /// The first alone.
+    #[default]
+    Off,
+    /// Both, side by side.
+    Halves,
+    /// How they differ, amplified.
+    Difference,
+}
+
+impl Split {
+    /// All of them.
+    pub const ALL: [Split; 3] = [Split::Off, Split::Halves, Split::Difference];
+
+    /// What it is called, and what it does.
+    pub fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Split::Off => ("One", "One method alone"),
+            Split::Halves => ("Two", "The same view by two methods: drag the line between them"),
+            Split::Difference => ("Difference", "How far the two pictures differ, amplified"),
+        }
+    }
+}
+
+/// A method of detail, and how finely it draws.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Detail {
+    /// How triangles are chosen.
+    #[serde(with = "by_name")]
+    pub method: Method,
+    /// How far from its place the mesh may be drawn (pixels).
+    pub tolerance_pixels: f64,
+    /// The most triangles of the ground, and as many of the sea.
+    pub triangles: u32,
+}
+
+impl Default for Detail {
+    fn default() -> Detail {
+        Detail { method: Method::Quadtree, tolerance_pixels: 1.0, triangles: 150_000 }
+    }
+}
+
+/// What says where the sun stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SunBy {
+    /// It stands where it suits the land.
+    #[default]
+    Land,
+    /// Its bearing and elevation.
+    Hand,
+    /// Date, time of day and place.
+    Date,
+}
+
+impl SunBy {
+    /// All of them.
+    pub const ALL: [SunBy; 3] = [SunBy::Land, SunBy::Hand, SunBy::Date];
+
+    /// What it is called, and what it does.
+    pub fn words(self) -> (&'static str, &'static str) {
+        match self {
+            SunBy::Land => ("As suits", "The sun stands where it suits the land"),
+            SunBy::Hand => ("By hand", "Its bearing, and its height over the horizon"),
+            SunBy::Date => ("By date", "Where it stands on a day at an hour, over the place of the land"),
+        }
+    }
+}
+
 /// All that is remembered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// Of the file's format.
     pub version: u32,
-    /// How triangles are chosen.
-    pub method: Method,
-    /// How far from its place the mesh may be drawn (pixels).
-    pub tolerance_pixels: f64,
-    /// The most triangles of the ground, and as many of the sea.
-    pub triangles: u32,
     /// How the picture is drawn.
     pub style: Style,
     /// One pixel of light for so many of the window's, each way.
     pub coarse: u32,
     /// Textured, wireframe or both.
     pub show: Show,
-    /// Whether the sun stands where it suits the land, and not where it was put.
-    pub own_sun: bool,
+    /// What says where the sun stands.
+    pub sun: SunBy,
     /// Bearing of the sun (degrees, clockwise from north).
     pub sun_azimuth_degrees: f64,
     /// Its elevation (degrees).
     pub sun_elevation_degrees: f64,
+    /// The year of the sun by date.
+    pub year: i16,
+    /// The day of that year, from 1.
+    pub day: u16,
+    /// The hour of the sun's own time there, 12 at noon.
+    pub hour: f64,
+    /// Where land lies that does not say so: east (degrees).
+    pub longitude_degrees: f64,
+    /// And north (degrees).
+    pub latitude_degrees: f64,
     /// How far one sees (km); 0 for what suits the land.
     pub visibility_kilometres: f64,
     /// The sea's state, as it is typed.
@@ -153,6 +177,30 @@ pub struct Settings {
     pub below: bool,
     /// Whether the panel is open.
     pub panel: bool,
+    /// How long a frame may take (ms): the tolerance follows; 0 for as long as it takes.
+    pub budget_milliseconds: f64,
+    /// Which pictures are shown of two methods.
+    pub split: Split,
+    /// By how much differences are amplified.
+    pub gain: f64,
+    /// How triangles are chosen.
+    pub first: Detail,
+    /// And those of the second picture.
+    pub second: Detail,
+}
+
+/// Methods are saved by their names.
+mod by_name {
+    use littoral::lod::Method;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub fn serialize<S: Serializer>(method: &Method, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(method.name())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Method, D::Error> {
+        String::deserialize(from)?.parse().map_err(D::Error::custom)
+    }
 }
 
 /// The newest version of the file.
@@ -162,15 +210,17 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             version: VERSION,
-            method: Method::default(),
-            tolerance_pixels: 1.0,
-            triangles: 150_000,
             style: Style::default(),
             coarse: 1,
             show: Show::default(),
-            own_sun: true,
+            sun: SunBy::Land,
             sun_azimuth_degrees: 240.0,
             sun_elevation_degrees: 25.0,
+            year: 2026,
+            day: 172,
+            hour: 17.0,
+            longitude_degrees: 10.0,
+            latitude_degrees: 50.0,
             visibility_kilometres: 0.0,
             sea: "beaufort=4,from=225".to_owned(),
             waves: true,
@@ -180,6 +230,11 @@ impl Default for Settings {
             mode: Mode::Fly,
             below: false,
             panel: true,
+            budget_milliseconds: 0.0,
+            split: Split::Off,
+            gain: 8.0,
+            first: Detail::default(),
+            second: Detail { method: Method::Whole, ..Detail::default() },
         }
     }
 }
@@ -222,16 +277,30 @@ impl Settings {
                 wrong.push(name);
             }
         };
-        number("tolerance_pixels", &mut self.tolerance_pixels, usual.tolerance_pixels, 0.05, 100.0);
+        number("first.tolerance_pixels", &mut self.first.tolerance_pixels, usual.first.tolerance_pixels, 0.05, 100.0);
+        number(
+            "second.tolerance_pixels",
+            &mut self.second.tolerance_pixels,
+            usual.second.tolerance_pixels,
+            0.05,
+            100.0,
+        );
+        number("budget_milliseconds", &mut self.budget_milliseconds, usual.budget_milliseconds, 0.0, 10_000.0);
+        number("gain", &mut self.gain, usual.gain, 1.0, 255.0);
         number("sun_azimuth_degrees", &mut self.sun_azimuth_degrees, usual.sun_azimuth_degrees, 0.0, 360.0);
         number("sun_elevation_degrees", &mut self.sun_elevation_degrees, usual.sun_elevation_degrees, -90.0, 90.0);
         number("visibility_kilometres", &mut self.visibility_kilometres, usual.visibility_kilometres, 0.0, 1000.0);
+        number("hour", &mut self.hour, usual.hour, 0.0, 24.0);
+        number("longitude_degrees", &mut self.longitude_degrees, usual.longitude_degrees, -180.0, 180.0);
+        number("latitude_degrees", &mut self.latitude_degrees, usual.latitude_degrees, -90.0, 90.0);
         number("exaggeration", &mut self.exaggeration, usual.exaggeration, 0.01, 1000.0);
         number("speed", &mut self.speed, usual.speed, 0.01, 100.0);
         number("field_degrees", &mut self.field_degrees, usual.field_degrees, 5.0, 120.0);
-        if !(1000..=20_000_000).contains(&self.triangles) {
-            self.triangles = usual.triangles;
-            wrong.push("triangles");
+        for (name, detail) in [("first.triangles", &mut self.first), ("second.triangles", &mut self.second)] {
+            if !(1000..=20_000_000).contains(&detail.triangles) {
+                detail.triangles = Detail::default().triangles;
+                wrong.push(name);
+            }
         }
         if !(1..=8).contains(&self.coarse) {
             self.coarse = usual.coarse;
@@ -263,9 +332,12 @@ mod tests {
         let file = folder.path().join("deep/fly.toml");
         assert_eq!(Settings::load(&file), (Settings::default(), None), "none yet, nothing to say");
         let settings = Settings {
-            method: Method::Roam,
+            first: Detail { method: Method::Roam, ..Detail::default() },
+            second: Detail { tolerance_pixels: 0.2, ..Detail::default() },
+            split: Split::Halves,
             show: Show::Both,
             style: Style::Plain,
+            sun: SunBy::Date,
             sea: "wind=14,from=300".into(),
             exaggeration: 2.5,
             mode: Mode::Boat,
@@ -283,9 +355,14 @@ mod tests {
             std::fs::write(&file, text).expect("written");
             Settings::load(&file)
         };
-        for text in
-            [&b"version = 99"[..], b"metod = \"roam\"", b"method = \"rome\"", b"speed = \"fast\"", b"\xff\xfe", b"= ="]
-        {
+        for text in [
+            &b"version = 99"[..],
+            b"metod = \"roam\"",
+            b"first.method = \"rome\"",
+            b"speed = \"fast\"",
+            b"\xff\xfe",
+            b"= =",
+        ] {
             let (settings, message) = load(text);
             assert_eq!(settings, Settings::default());
             let message = message.expect("a message");
@@ -293,9 +370,17 @@ mod tests {
             assert!(!message.contains('\n'), "{message}");
         }
         // What is missing has its usual value, what is out of range too.
-        let (settings, message) = load(b"method = \"strips\"\nspeed = nan\ntriangles = 5\nfield_degrees = 60");
-        assert_eq!(settings, Settings { method: Method::Strips, field_degrees: 60.0, ..Settings::default() });
-        assert!(message.is_some_and(|m| m.contains("speed, triangles")));
+        let (settings, message) =
+            load(b"first.method = \"strips\"\nspeed = nan\nfirst.triangles = 5\nfield_degrees = 60");
+        assert_eq!(
+            settings,
+            Settings {
+                first: Detail { method: Method::Strips, ..Detail::default() },
+                field_degrees: 60.0,
+                ..Settings::default()
+            }
+        );
+        assert!(message.is_some_and(|m| m.contains("speed, first.triangles")));
         assert_eq!(load(b""), (Settings::default(), None));
     }
 }

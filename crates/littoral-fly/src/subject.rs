@@ -92,10 +92,10 @@ impl Subject {
         self.georeference.as_ref().map_or(0.0, |g| -g.true_north())
     }
 
-    /// The latitude of its middle (rad), where it can be known.
-    pub fn latitude(&self) -> Option<f64> {
+    /// Longitude and latitude of its middle (degrees), where they can be known.
+    pub fn lonlat(&self) -> Option<DVec2> {
         let georeference = self.georeference.as_ref()?;
-        georeference.lonlat_from_crs(georeference.middle()).ok().map(|lonlat| lonlat.y.to_radians())
+        georeference.lonlat_from_crs(georeference.middle()).ok()
     }
 
     /// Height of the ground (m, stretched) at a place, its border included but for rounding.

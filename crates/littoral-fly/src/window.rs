@@ -1,7 +1,9 @@
 //! The window: events in, pictures out. It never waits for the scene.
 
 use crate::Arguments;
+use crate::camera::{Hands, Mode};
 use crate::cockpit::{Cockpit, median};
+use crate::compare::Difference;
 use crate::film::Filming;
 use crate::keys;
 use crate::paint::{Gui, Missed, Paint};
@@ -69,6 +71,8 @@ struct Flight {
     complaints: Arc<Mutex<Vec<String>>>,
     lost: Arc<AtomicBool>,
     held: HashSet<KeyCode>,
+    #[cfg(feature = "gamepad")]
+    gamepads: Option<crate::gamepad::Gamepads>,
     cursor: Vec2,
     /// The mouse button that turns the look.
     looking: Option<MouseButton>,
@@ -104,6 +108,9 @@ struct Answer {
     method_ms: f32,
     triangles: f32,
     bound_pixels: f32,
+    tolerance_pixels: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    difference: Option<Difference>,
     adapter: String,
 }
 
@@ -140,6 +147,8 @@ impl Flight {
             // Without a graphics card, light for every pixel of a window takes too long.
             cockpit.settings.coarse = 4;
         }
+        // And a picture of which a part always moves would never get sharp.
+        cockpit.still = paint.gpu.is_software();
         if let Some(note) = app.note.take() {
             cockpit.note(note);
         }
@@ -175,6 +184,8 @@ impl Flight {
             complaints,
             lost,
             held: HashSet::new(),
+            #[cfg(feature = "gamepad")]
+            gamepads: crate::gamepad::Gamepads::new(),
             cursor: Vec2::ZERO,
             looking: None,
             dragged: None,
@@ -205,9 +216,12 @@ impl Flight {
         let size = self.paint.size();
         let hands = match &self.smoke {
             // Always the same way, whatever the clock says.
-            Some(_) => crate::camera::Hands { forward: 0.3, turn: 0.3, ..Default::default() },
-            None => keys::hands(&self.held),
+            Some(_) => Hands { forward: 0.3, turn: 0.3, ..Default::default() },
+            None => self.hands(events),
         };
+        if self.filming.is_none() {
+            self.cockpit.steer(passed * 1e3);
+        }
         match &mut self.filming {
             Some(filming) => filming.pose(&mut self.cockpit),
             None if self.smoke.is_some() => self.cockpit.advance(&hands, 1.0 / 60.0),
@@ -217,7 +231,11 @@ impl Flight {
         self.paint.take_textures(&mut gui);
         self.slot.wish(self.cockpit.wish(size));
         match self.paint.show(&self.cockpit, &gui) {
-            Ok(()) => self.count(passed, events)?,
+            Ok(rests) => {
+                self.cockpit.rests = rests;
+                self.cockpit.difference = self.paint.difference();
+                self.count(passed, events)?;
+            }
             Err(Missed::Frame) => std::thread::sleep(std::time::Duration::from_millis(5)),
             Err(Missed::Lost(problem)) => return Err(problem),
         }
@@ -226,6 +244,29 @@ impl Flight {
         }
         self.film();
         Ok(())
+    }
+
+    /// What keys ask for.
+    #[cfg(not(feature = "gamepad"))]
+    fn hands(&mut self, _: &ActiveEventLoop) -> Hands {
+        keys::hands(&self.held)
+    }
+
+    /// What keys and gamepads ask for.
+    #[cfg(feature = "gamepad")]
+    fn hands(&mut self, events: &ActiveEventLoop) -> Hands {
+        use crate::gamepad::{Gamepads, Pressed, both};
+        let (pads, buttons) = self.gamepads.as_mut().map(Gamepads::read).unwrap_or_default();
+        for button in buttons {
+            match button {
+                Pressed::Key(key) => self.pressed(key, events),
+                Pressed::NextMode => {
+                    self.cockpit.change_mode(neighbour(&Mode::ALL, self.cockpit.camera.mode(), false));
+                }
+                Pressed::Faster(by) => self.cockpit.faster(by),
+            }
+        }
+        both(&keys::hands(&self.held), &pads)
     }
 
     /// Takes what the scene told.
@@ -280,20 +321,22 @@ impl Flight {
             };
         };
         smoke.milliseconds.push((passed * 1e3) as f32);
-        smoke.method.push(frame.milliseconds as f32);
-        smoke.triangles.push(frame.triangles() as f32);
-        smoke.bound.push(frame.ground_reached.pixels);
+        smoke.method.push(frame.first.milliseconds as f32);
+        smoke.triangles.push(frame.first.triangles() as f32);
+        smoke.bound.push(frame.first.ground_reached.pixels);
         if smoke.milliseconds.len() as u32 >= smoke.frames {
             let size = self.paint.size();
             let answer = Answer {
                 frames: smoke.frames,
                 width: size.x,
                 height: size.y,
-                method: self.cockpit.settings.method.words().0,
+                method: self.cockpit.settings.first.method.name(),
                 frame_ms: median(smoke.milliseconds.iter().copied()),
                 method_ms: median(smoke.method.iter().copied()),
                 triangles: median(smoke.triangles.iter().copied()),
                 bound_pixels: median(smoke.bound.iter().copied()),
+                tolerance_pixels: self.cockpit.first().tolerance_pixels,
+                difference: self.cockpit.difference.filter(|_| self.cockpit.second().is_some()),
                 adapter: self.shown.adapter.clone(),
             };
             println!("{}", serde_json::to_string(&answer).map_err(|e| e.to_string())?);
@@ -373,8 +416,8 @@ impl Flight {
             }
             return;
         }
-        use crate::camera::Mode;
-        use crate::settings::{Method, Show, Style};
+        use crate::settings::{Show, Split, Style};
+        use littoral::lod::Method;
         let settings = &mut cockpit.settings;
         match key {
             KeyCode::F1 => self.shown.help = !self.shown.help,
@@ -386,14 +429,15 @@ impl Flight {
             KeyCode::Digit3 => cockpit.change_mode(Mode::Walk),
             KeyCode::Digit4 => cockpit.change_mode(Mode::Boat),
             KeyCode::Home => cockpit.home(),
-            KeyCode::KeyM => settings.method = neighbour(&Method::ALL, settings.method, shift),
+            KeyCode::KeyM => settings.first.method = neighbour(&Method::ALL, settings.first.method, shift),
+            KeyCode::KeyV => settings.split = neighbour(&Split::ALL, settings.split, shift),
             KeyCode::KeyX => settings.show = neighbour(&Show::ALL, settings.show, shift),
             KeyCode::KeyT => settings.style = neighbour(&Style::ALL, settings.style, shift),
             KeyCode::Equal | KeyCode::NumpadAdd => {
-                settings.tolerance_pixels = (settings.tolerance_pixels / 1.25).max(0.1);
+                settings.first.tolerance_pixels = (settings.first.tolerance_pixels / 1.25).max(0.1);
             }
             KeyCode::Minus | KeyCode::NumpadSubtract => {
-                settings.tolerance_pixels = (settings.tolerance_pixels * 1.25).min(50.0);
+                settings.first.tolerance_pixels = (settings.first.tolerance_pixels * 1.25).min(50.0);
             }
             KeyCode::KeyF => cockpit.freeze(size),
             KeyCode::KeyL => cockpit.editing = !cockpit.editing,
@@ -475,10 +519,10 @@ impl Flight {
             };
             let far = cockpit.editor.position(point, &surface).map_or(100.0, |at| at.distance(cockpit.camera.eye));
             cockpit.editor.raise(point, (by * 0.01 * far).round());
-        } else if cockpit.camera.mode() == crate::camera::Mode::Orbit {
+        } else if cockpit.camera.mode() == Mode::Orbit {
             cockpit.camera.zoom(0.15 * by);
         } else {
-            cockpit.settings.speed = (cockpit.settings.speed * 1.2f64.powf(by)).clamp(0.05, 20.0);
+            cockpit.faster(1.2f64.powf(by));
         }
     }
 }

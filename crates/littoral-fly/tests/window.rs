@@ -173,6 +173,19 @@ fn a_flight_by_keys_and_clicks() {
     key("x");
     key("x");
 
+    // A second method beside the first, how they differ, and the first alone again.
+    let bright =
+        |picture: &[[u8; 3]]| picture.iter().flatten().map(|v| f64::from(*v)).sum::<f64>() / picture.len() as f64;
+    let one = take();
+    key("v");
+    let two = wait(60, "two pictures", || Some(take()).filter(|two| differ(&one.2, &two.2) > 0.05));
+    assert!(shows_something(&two));
+    key("v");
+    let apart = take();
+    assert!(bright(&apart.2) < 0.5 * bright(&one.2), "a difference is mostly dark");
+    key("v");
+    assert!(differ(&one.2, &take().2) < differ(&one.2, &two.2), "one again");
+
     // Three points of a path, one of them taken back, all saved.
     key("Home");
     key("l");
@@ -206,7 +219,7 @@ fn a_flight_by_keys_and_clicks() {
     let status = wait(60, "an end", || program.0.try_wait().expect("asked"));
     assert!(status.success(), "{status}");
     let remembered = std::fs::read_to_string(&settings).expect("settings are saved");
-    for line in ["method = \"patches\"", "mode = \"boat\"", "triangles = 20000"] {
+    for line in ["method = \"patches\"", "mode = \"boat\"", "triangles = 20000", "split = \"off\""] {
         assert!(remembered.contains(line), "{line} in {remembered}");
     }
 }

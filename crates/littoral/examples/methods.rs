@@ -9,7 +9,7 @@
 
 use glam::{UVec2, Vec3};
 use littoral::field::{Water, coast};
-use littoral::lod::{Drawing, Limits, Lod, Nested, Patches, Quadtree, Roam, Strips, Whole};
+use littoral::lod::{Drawing, Limits, Method};
 use littoral::picture::{Display, Exposure, Meshes, Scene, Settings, Stage, Sun, mesh_errors};
 use littoral::space::View;
 use std::error::Error;
@@ -29,21 +29,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let view = View { tolerance_pixels: tolerance, ..coast::view(size) };
 
     let limits = Limits { finest: stage.land().finest_level(), triangles: 1_000_000 };
-    let methods: [(&str, Box<dyn Lod>); 6] = [
-        ("whole", Box::new(Whole::new(limits))),
-        ("nested", Box::new(Nested::new(limits))),
-        ("quadtree", Box::new(Quadtree::new(limits))),
-        ("patches", Box::new(Patches::new(limits))),
-        ("strips", Box::new(Strips::new(limits))),
-        ("roam", Box::new(Roam::new(limits))),
-    ];
     let settings = Settings { samples: 16, ..Settings::default() };
     let row_bytes = (3 * size.x * 3) as usize;
-    let mut sheet = vec![0u8; row_bytes * (size.y as usize) * methods.len()];
+    let mut sheet = vec![0u8; row_bytes * (size.y as usize) * Method::ALL.len()];
     let mut grey = None;
-    for (row, (name, mut lod)) in methods.into_iter().enumerate() {
+    for (row, method) in Method::ALL.into_iter().enumerate() {
         let mut drawing = Drawing::default();
-        let reached = lod.select(stage.land(), &view, &mut drawing)?;
+        let reached = method.within(limits).select(stage.land(), &view, &mut drawing)?;
         drawing.expand(stage.land());
         let mesh = &drawing.mesh;
         let errors = mesh_errors(mesh, stage.land(), &view);
@@ -74,7 +66,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         let worst = errors.iter().filter(|e| !e.is_nan()).fold(0.0f32, |m, e| m.max(e.abs()));
         println!(
-            "{name:<10} {:>8} triangles, within {:.2} pixels, worst {worst:.2}",
+            "{method:<10} {:>8} triangles, within {:.2} pixels, worst {worst:.2}",
             mesh.triangles.len(),
             reached.pixels
         );

@@ -4,14 +4,12 @@ mod counted;
 mod figure;
 
 use super::mountains;
-use crate::detail::Method;
 use crate::plot;
 use crate::talk::{Failure, Talk, progress, tidy};
-use clap::ValueEnum;
 use counted::Counted;
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::{HeightField, Land, Sea, coast};
-use littoral::lod::{Drawing, Limits, Mesh, NestedBounds, RoamFlight};
+use littoral::lod::{Drawing, Limits, Mesh, Method, NestedBounds, RoamFlight};
 use littoral::picture::mesh_errors;
 use littoral::space::{Datum, View};
 use littoral::waves::Superposition;
@@ -127,10 +125,10 @@ impl Lod {
         bar.finish_and_clear();
         let flights = flights(&mountains, &coast, &sea, &bounds);
         let runs = if self.plot.is_some() { 1 + SWEEP.len() } else { 1 };
-        let bar = progress((flights.len() * Method::value_variants().len() * runs) as u64, "flying");
+        let bar = progress((flights.len() * Method::ALL.len() * runs) as u64, "flying");
         let (mut rows, mut sweep) = (Vec::new(), Vec::new());
         for flight in &flights {
-            for &method in Method::value_variants() {
+            for method in Method::ALL {
                 rows.push(self.fly(flight, method, self.tolerance, self.frames, LONGEST)?);
                 bar.inc(1);
                 for factor in SWEEP.iter().filter(|_| self.plot.is_some()) {
@@ -238,7 +236,7 @@ impl Lod {
         let triangle_count = triangles[at(0.5, triangles.len())];
         Ok(Row {
             flight: flight.name,
-            method: format!("{method:?}").to_lowercase(),
+            method: method.to_string(),
             tolerance_pixels: tolerance,
             triangles: triangle_count,
             vertices: vertex_count,

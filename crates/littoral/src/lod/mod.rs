@@ -13,6 +13,7 @@
 //! watertight is decided exactly.
 
 mod drawing;
+mod method;
 mod metric;
 mod nested;
 mod patches;
@@ -22,6 +23,7 @@ mod strips;
 mod whole;
 
 pub use drawing::{Drawing, Edge, Mesh, Patch, Stencil, Vertex};
+pub use method::{Method, UnknownMethod};
 pub use metric::{Bounds, ScreenMetric, ViewError};
 pub use nested::{Nested, Seams};
 pub use patches::Patches;
