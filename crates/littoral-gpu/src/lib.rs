@@ -14,6 +14,7 @@ mod painter;
 mod renderer;
 mod scenery;
 pub mod sea;
+mod tessellator;
 mod triangles;
 
 pub use device::{Gpu, GpuError};
@@ -22,4 +23,5 @@ pub use painter::{Painter, PainterError};
 pub use renderer::{Renderer, SHADERS};
 pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
+pub use tessellator::{TESSELLATION_SHADERS, Tessellated, Tessellator};
 pub use triangles::{TooMany, Triangles};

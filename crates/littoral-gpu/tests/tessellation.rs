@@ -1,0 +1,135 @@
+//! Tessellation on the device: the processor's triangles, and what every method of detail promises.
+
+#![allow(missing_docs)]
+
+#[path = "../../littoral/tests/lod/check.rs"]
+mod check;
+#[path = "../../littoral/tests/lod/surfaces.rs"]
+#[expect(dead_code, reason = "the suite of the processor's methods asks for more surfaces")]
+mod surfaces;
+
+use check::{Case, check, sorted};
+use glam::{DVec3, UVec2};
+use littoral::field::{HeightField, Land, coast};
+use littoral::lod::{Drawing, Limits, Lod, Patches, Reached, ViewError};
+use littoral::picture::coast_shot;
+use littoral::space::View;
+use littoral_gpu::{Gpu, Tessellated, Tessellator};
+use std::collections::HashSet;
+pub use surfaces::{Random, Surface};
+use surfaces::{random_terrain, random_view, surface_of};
+
+fn gpu() -> Option<Gpu> {
+    match Gpu::headless() {
+        Ok(gpu) => Some(gpu),
+        Err(e) => {
+            eprintln!("not tested: {e}");
+            None
+        }
+    }
+}
+
+/// The device as a method of detail.
+struct OnDevice<'a> {
+    gpu: &'a Gpu,
+    tessellator: Tessellator,
+    /// What the last one came to.
+    told: Option<Tessellated>,
+}
+
+impl OnDevice<'_> {
+    fn new<'a>(gpu: &'a Gpu, land: &Land, limits: Limits) -> OnDevice<'a> {
+        OnDevice { gpu, tessellator: Tessellator::new(gpu, land, limits).expect("a small land"), told: None }
+    }
+}
+
+impl Lod for OnDevice<'_> {
+    fn select(&mut self, _: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Reached, ViewError> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        self.tessellator.tessellate(self.gpu, &mut encoder, view, None)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        drawing.clear();
+        drawing.mesh = self.tessellator.mesh(self.gpu).expect("a device");
+        let told = self.tessellator.read(self.gpu).expect("a device");
+        assert!(told.triangles <= self.tessellator.limit(), "{told:?}");
+        self.told = Some(told);
+        Ok(told.reached)
+    }
+}
+
+/// Triangles that both draw, and those that only one of them does.
+fn compare(land: &Land, limits: Limits, on_device: &mut OnDevice, view: &View) -> (usize, usize) {
+    let mut twin = Patches::new(limits);
+    let (mut expected, mut got) = (Drawing::default(), Drawing::default());
+    let reached = twin.select(land, view, &mut expected).expect("a view");
+    expected.expand(land);
+    let told = on_device.select(land, view, &mut got).expect("a view");
+    let (expected, got) = (sorted(&expected), sorted(&got));
+    assert!(got.windows(2).all(|pair| pair[0] != pair[1]), "a triangle is drawn twice");
+    let [expected, got] = [&expected, &got].map(|all| all.iter().collect::<HashSet<_>>());
+    let apart = expected.symmetric_difference(&got).count();
+    if apart == 0 {
+        assert!((told.pixels - reached.pixels).abs() <= 1e-4 * reached.pixels, "{told:?} for {reached:?}");
+        assert_eq!(told.limited, reached.limited);
+    }
+    (expected.intersection(&got).count(), apart)
+}
+
+#[test]
+fn the_coast_in_the_processors_triangles() {
+    let Some(gpu) = gpu() else { return };
+    let land = coast::coast();
+    let (mut same, mut apart) = (0, 0);
+    for triangles in [500_000, 20_000, 700] {
+        let limits = Limits { finest: land.finest_level(), triangles };
+        let mut on_device = OnDevice::new(&gpu, &land, limits);
+        for turn in 0..8 {
+            let view = coast_shot(UVec2::new(960, 540)).view;
+            let towards = DVec3::new((f64::from(turn) * 0.8).sin(), (f64::from(turn) * 0.8).cos(), -0.2);
+            let mut view = View::looking_at(view.eye, view.eye + towards, 0.9, view.size);
+            view.tolerance_pixels = [0.5, 1.0, 3.0][turn as usize % 3];
+            let (both, one) = compare(&land, limits, &mut on_device, &view);
+            (same, apart) = (same + both, apart + one);
+        }
+    }
+    eprintln!("the coast: {same} triangles drawn by both, {apart} by one of them");
+    assert!(same > 100_000);
+    assert!(apart * 2000 < same, "{apart} triangles apart of {same}");
+}
+
+/// How many random lands are looked at.
+fn cases() -> std::ops::Range<u64> {
+    let number = |name| std::env::var(name).ok().and_then(|n| n.parse().ok());
+    let first = number("LITTORAL_FIRST").unwrap_or(0);
+    first..first + number("LITTORAL_CASES").unwrap_or(20)
+}
+
+#[test]
+fn random_lands_keep_what_methods_promise() {
+    let Some(gpu) = gpu() else { return };
+    let (mut same, mut apart, mut views) = (0, 0, 0);
+    for seed in cases() {
+        let mut random = Random::new(seed);
+        let most = if seed % 4 == 0 { 200 } else { 70 };
+        let (columns, rows) = (2 + random.below(most) as usize, 2 + random.below(most) as usize);
+        let land = random_terrain(columns, rows, &mut random);
+        // Coarser than the samples, as fine, or finer, which the device does not draw.
+        let finest = (land.finest_level() + random.below(3) as u8).saturating_sub(1);
+        let limits = Limits { finest, triangles: [300, 4_000, 20_000][random.below(3) as usize] };
+        let mut on_device = OnDevice::new(&gpu, &land, limits);
+        let limits = Limits { finest: finest.min(land.finest_level()), ..limits };
+        let surface = surface_of(land.clone());
+        for turn in 0..3 {
+            let view = random_view(&surface, &mut random);
+            let label = format!("seed {seed} view {turn}");
+            check(&mut on_device, &Case { surface: &surface, view: &view, limits, label: &label }, &mut random);
+            let (both, one) = compare(&land, limits, &mut on_device, &view);
+            if one > 0 {
+                eprintln!("{label}: {both} triangles drawn by both, {one} by one of them");
+            }
+            (same, apart, views) = (same + both, apart + one, views + usize::from(one > 0));
+        }
+    }
+    eprintln!("random lands: {same} triangles drawn by both, {apart} by one of them, in {views} views");
+    assert!(apart * 500 <= same, "{apart} triangles apart of {same}");
+}
