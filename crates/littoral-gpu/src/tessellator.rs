@@ -1,14 +1,15 @@
 //! Triangle patches cut level by level on the device: the twin of [`littoral::lod::Patches`], with the same triangles.
 //!
-//! The lists of all levels lie one after the other in one buffer. For each level four passes go over its list, as many workgroups as the pass before
-//! wrote down: *count* tells the census what would be drawn at which tolerance, *settle* raises the tolerance if that is more than allowed, *reserve* gives what
-//! is cut its place for four children, and *link* of the next level writes these, with the cells beside them and what they amount to in the view. In the end *draw* goes
+//! The lists of all levels lie one after the other in one buffer. For each level three passes go over its list, as many workgroups as an earlier pass
+//! wrote down: *count* tells the census what would be drawn at which tolerance, *settle* raises the tolerance if that is more than allowed, and *cut* puts four
+//! children in place of what is worth it, with what they amount to in the view. The first levels are done in one pass by one workgroup. In the end *draw* goes
 //! over all lists and puts out triangles and, for an indirect draw, their number. The processor records the same commands for every view and reads nothing back.
 //!
 //! A cell decides once, before its neighbours ask: so there are no cracks, whatever rounding does. Boxes about cells are counted from the eye in lattice
 //! integers; they are a few parts in 10⁷ wider than the processor's, whose decision the device's may differ from where a bound is that near to the tolerance.
 //!
-//! Where lists are full, the tolerance rises as it does where triangles run out: what is cut is cut everywhere, and nothing is lost.
+//! Where lists are full, the tolerance rises as it does where triangles run out: all that is drawn is drawn with the same one, nothing is left out, and
+//! what was reached is told.
 //!
 //! After the virtual Earth of GraphiCon 2016, whose tessellation and geometry stages portable interfaces do not have.
 
@@ -98,13 +99,12 @@ pub struct Tessellator {
     bins: wgpu::Buffer,
     /// Workgroups of the next pass, written by turns.
     workgroups: [wgpu::Buffer; 2],
-    begin: wgpu::ComputePipeline,
+    first_levels: wgpu::ComputePipeline,
     count: wgpu::ComputePipeline,
     settle: wgpu::ComputePipeline,
-    reserve: wgpu::ComputePipeline,
-    link: wgpu::ComputePipeline,
+    cut: wgpu::ComputePipeline,
     draw: wgpu::ComputePipeline,
-    /// By level.
+    /// By level; the first is for all of [`FIRST_LEVELS`].
     levels: Vec<wgpu::BindGroup>,
     /// For passes that write to the first or the second of `workgroups`.
     turns: [wgpu::BindGroup; 2],
@@ -114,8 +114,11 @@ pub struct Tessellator {
     tolerance: f32,
 }
 
-/// Cells that there is room for, for each triangle allowed.
-const CELLS_A_TRIANGLE: u64 = 4;
+/// Cells that there is room for, for each triangle allowed, and beside: where no limit binds half a cell is looked at for each triangle drawn, and several where one does.
+const CELLS_A_TRIANGLE: u64 = 2;
+const CELLS_BESIDE: u64 = 4096;
+/// Levels that one workgroup does.
+const FIRST_LEVELS: u8 = 5;
 /// Threads of a workgroup.
 const THREADS: u64 = 256;
 /// Bins of the census: see `Census` of the processor's twin.
@@ -130,6 +133,20 @@ impl Tessellator {
     /// # Errors
     /// If the land has more samples along a side than the device's textures.
     pub fn new(gpu: &Gpu, land: &Land, limits: Limits) -> Result<Tessellator, TooLarge> {
+        let triangles = limits.triangles.max(64) as u64;
+        Tessellator::with_room(
+            gpu,
+            land,
+            limits,
+            CELLS_A_TRIANGLE.saturating_mul(triangles).saturating_add(CELLS_BESIDE),
+        )
+    }
+
+    /// The same, with room for so many cells that are looked at, at least 64 and 48 bytes each. Where it does not do, the tolerance rises.
+    ///
+    /// # Errors
+    /// As [`Tessellator::new`].
+    pub fn with_room(gpu: &Gpu, land: &Land, limits: Limits, cells: u64) -> Result<Tessellator, TooLarge> {
         let device = &gpu.device;
         let on_device = DeviceLand::new(gpu, land)?;
         let finest = limits.finest.min(land.finest_level());
@@ -137,7 +154,7 @@ impl Tessellator {
         let vertex = size_of::<Vertex>() as u64;
         let most = (limits.triangles.max(64) as u64).min(bound / (3 * vertex)).min(u64::from(u32::MAX / 8));
         let workgroups = u64::from(device.limits().max_compute_workgroups_per_dimension);
-        let room = (CELLS_A_TRIANGLE * most + 1024).min(bound / 16).min(workgroups * THREADS);
+        let room = cells.max(64).min(bound / 16).min(workgroups * THREADS);
 
         use wgpu::BufferUsages as Usage;
         let buffer = |label, size, usage| {
@@ -168,8 +185,8 @@ impl Tessellator {
         let turn_layout = layout(device, &[write]);
         let draw_layout = layout(device, &[&shared[..], &[write, write, write]].concat());
         let group = |number: u8, layout: &wgpu::BindGroupLayout, more: &[&wgpu::Buffer]| {
-            let views = [&on_device.cells[usize::from(number)], &on_device.heights]
-                .map(|texture| texture.create_view(&Default::default()));
+            let views =
+                [on_device.cells(number), &on_device.heights].map(|texture| texture.create_view(&Default::default()));
             let number = wgpu::BufferBinding {
                 buffer: &numbers,
                 offset: NUMBER * u64::from(number),
@@ -209,11 +226,10 @@ impl Tessellator {
         let alone = [Some(&level_layout)];
         let both = [Some(&level_layout), Some(&turn_layout)];
         Ok(Tessellator {
-            begin: pipeline(&levels, "begin", &both),
+            first_levels: pipeline(&levels, "first_levels", &both),
             count: pipeline(&levels, "count", &alone),
-            settle: pipeline(&levels, "settle", &alone),
-            reserve: pipeline(&levels, "reserve", &alone),
-            link: pipeline(&levels, "link", &both),
+            settle: pipeline(&levels, "settle", &both),
+            cut: pipeline(&levels, "cut_level", &alone),
             draw: pipeline(&draw, "draw", &[Some(&draw_layout)]),
             levels: (0..=finest).map(|number| group(number, &level_layout, &[&bins])).collect(),
             turns: [0, 1].map(|turn| bind(device, &turn_layout, vec![turns[turn].as_entire_binding()])),
@@ -258,29 +274,30 @@ impl Tessellator {
             label: Some("tessellation"),
             timestamp_writes: timestamps,
         });
-        for (number, level) in self.levels.iter().enumerate() {
-            let now = &self.workgroups[number % 2];
-            pass.set_bind_group(0, level, &[]);
-            pass.set_bind_group(1, &self.turns[number % 2], &[]);
-            if number == 0 {
-                pass.set_pipeline(&self.begin);
-                pass.dispatch_workgroups(1, 1, 1);
-            } else {
-                pass.set_pipeline(&self.link);
-                pass.dispatch_workgroups_indirect(&self.workgroups[1 - number % 2], 0);
+        // A pass over a list goes by the one of two buffers that the pass before last wrote.
+        let of = |level: u8| usize::from(level) % 2;
+        let first = self.finest.min(FIRST_LEVELS - 1);
+        pass.set_pipeline(&self.first_levels);
+        pass.set_bind_group(0, &self.levels[0], &[]);
+        pass.set_bind_group(1, &self.turns[of(first + 1)], &[]);
+        pass.dispatch_workgroups(1, 1, 1);
+        for level in first + 1..=self.finest {
+            pass.set_bind_group(0, &self.levels[usize::from(level)], &[]);
+            if level > first + 1 {
+                pass.set_pipeline(&self.cut);
+                pass.dispatch_workgroups_indirect(&self.workgroups[of(level - 1)], 0);
             }
-            pass.set_pipeline(&self.count);
-            pass.dispatch_workgroups_indirect(now, 0);
+            if level < self.finest {
+                pass.set_pipeline(&self.count);
+                pass.dispatch_workgroups_indirect(&self.workgroups[of(level)], 0);
+            }
             pass.set_pipeline(&self.settle);
+            pass.set_bind_group(1, &self.turns[of(level + 1)], &[]);
             pass.dispatch_workgroups(1, 1, 1);
-            if number < usize::from(self.finest) {
-                pass.set_pipeline(&self.reserve);
-                pass.dispatch_workgroups_indirect(now, 0);
-            }
         }
         pass.set_pipeline(&self.draw);
         pass.set_bind_group(0, &self.drawing, &[]);
-        pass.dispatch_workgroups_indirect(&self.workgroups[usize::from(self.finest) % 2], 12);
+        pass.dispatch_workgroups_indirect(&self.workgroups[of(self.finest + 1)], 12);
         Ok(())
     }
 

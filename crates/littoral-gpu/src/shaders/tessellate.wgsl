@@ -29,7 +29,7 @@ struct Sight {
     rows: u32,
 }
 
-// What a pass works on: the number of its level.
+// The number of the level that a pass goes over.
 struct Level {
     number: u32,
 }
@@ -38,10 +38,9 @@ struct Level {
 struct Place {
     // Column and row among the cells of its level.
     at: vec2u,
-    // Where the first of its four children is in the lists, if it is cut.
+    // Where its parent is in the lists, and the first of its four children if it is cut.
+    parent: u32,
     children: u32,
-    // Its level, and from bit 8 on the sides over which a sliver stands unless the cell beyond is cut, too: a bit each.
-    level: u32,
 }
 
 // What it amounts to in the view.
@@ -52,6 +51,7 @@ struct Look {
     bound: f32,
     // The tolerance (pixels) below which it is cut: its bound, or its parent's if that is less.
     pixels: f32,
+    // Its kind in the lowest bits, its level from bit 8 on.
     kind: u32,
 }
 
@@ -66,7 +66,7 @@ struct State {
     vertices: atomic<u32>,
     // The greatest bound of what is drawn (pixels), as bits.
     reached: atomic<u32>,
-    // Where the list of each level begins, and the last one ends.
+    // Where the list of each level begins.
     firsts: array<u32, 32>,
 }
 
@@ -80,8 +80,13 @@ const WHOLE = 2u;
 const TORN = 3u;
 
 // Instead of a place in a list: not in the list; beyond the face.
-const ABSENT = 0xffffffffu;
-const BORDER = 0xfffffffeu;
+const ABSENT = 0x7fffffffu;
+const BORDER = 0x7ffffffeu;
+// A bit beside such a place: a sliver stands on that side unless the cell there is cut, too.
+const OPEN = 0x80000000u;
+
+// The cells of the first levels are in one texture, level after level from west to east.
+const TOGETHER = 6u;
 
 // Bits of numbers that are not finite, and of the largest that is.
 const INFINITE = 0x7f800000u;
@@ -95,7 +100,7 @@ const LARGEST = 0x7f7fffffu;
 @group(0) @binding(3) var heights: texture_2d<u32>;
 @group(0) @binding(4) var<storage, read_write> state: State;
 @group(0) @binding(5) var<storage, read_write> places: array<Place>;
-// The cells beyond the sides (south, east, north, west): places in the lists, ABSENT or BORDER.
+// Of cells that may be cut, those beyond the sides (south, east, north, west): places in the lists, ABSENT or BORDER, and OPEN.
 @group(0) @binding(6) var<storage, read_write> beside: array<vec4u>;
 @group(0) @binding(7) var<storage, read_write> looks: array<Look>;
 
@@ -110,10 +115,11 @@ struct Facts {
 
 fn facts(at: vec2u, level: u32) -> Facts {
     var land: Facts;
+    let above = vec2u(sight.samples_level - level);
+    if any(at > (vec2u(sight.columns, sight.rows) - 2u) >> above) {
+        return land;
+    }
     if level == sight.samples_level {
-        if at.x + 1u >= sight.columns || at.y + 1u >= sight.rows {
-            return land;
-        }
         let bits = vec4u(
             textureLoad(heights, at, 0).x,
             textureLoad(heights, at + vec2u(1u, 0u), 0).x,
@@ -135,10 +141,8 @@ fn facts(at: vec2u, level: u32) -> Facts {
         land.whole = true;
         return land;
     }
-    if any(at >= textureDimensions(cells)) {
-        return land;
-    }
-    let texel = textureLoad(cells, at, 0).xy;
+    let first = select(0u, (1u << level) - 1u, level < TOGETHER);
+    let texel = textureLoad(cells, at + vec2u(first, 0u), 0).xy;
     let low = texel.x & 0xffffu;
     let high = texel.x >> 16u;
     land.exists = low <= high;
@@ -149,6 +153,10 @@ fn facts(at: vec2u, level: u32) -> Facts {
         land.error = bitcast<f32>(texel.y);
     }
     return land;
+}
+
+fn kind(seen: Look) -> u32 {
+    return seen.kind & 3u;
 }
 
 // From the eye to a lattice point (m), level.
@@ -168,7 +176,7 @@ fn reach(normal: vec3f, low: vec3f, high: vec3f) -> f32 {
 
 fn look(at: vec2u, level: u32, above: f32) -> Look {
     let land = facts(at, level);
-    var seen = Look(above, 0.0, 0.0, EMPTY);
+    var seen = Look(above, 0.0, 0.0, EMPTY | (level << 8u));
     if !land.exists {
         return seen;
     }
@@ -186,7 +194,7 @@ fn look(at: vec2u, level: u32, above: f32) -> Look {
         within = within && reach(sight.sides[i].xyz, low, high) >= slack;
     }
     if !within {
-        seen.kind = select(EMPTY, UNSEEN, land.whole);
+        seen.kind |= select(EMPTY, UNSEEN, land.whole);
         return seen;
     }
 
@@ -195,11 +203,11 @@ fn look(at: vec2u, level: u32, above: f32) -> Look {
     let nearest = sight.stretch * depth;
     let per_area = 1.00001 / (depth * depth);
     if land.whole {
-        seen.kind = WHOLE;
+        seen.kind |= WHOLE;
         seen.bound = land.error * (sight.focal * (min(length(far.xy), nearest) * per_area));
     } else {
         // No farther off than it is large.
-        seen.kind = TORN;
+        seen.kind |= TORN;
         seen.bound = sight.focal * (min(length(far), nearest) * per_area) * length(high - low);
     }
     seen.bound = min(seen.bound, bitcast<f32>(LARGEST));

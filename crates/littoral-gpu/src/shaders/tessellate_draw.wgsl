@@ -36,16 +36,15 @@ fn draw(@builtin(global_invocation_id) thread: vec3u, @builtin(local_invocation_
         if is_cut(i) {
             let sides = beside[i];
             for (var side = 0u; side < 4u; side++) {
-                let other = sides[side];
-                if other >= BORDER || !is_cut(other) {
+                let other = sides[side] & ~OPEN;
+                if (sides[side] & OPEN) != 0u && (other >= BORDER || !is_cut(other)) {
                     slivers |= 1u << side;
                 }
             }
-            slivers &= places[i].level >> 8u;
         } else {
             // Numbers that are not negative are in the order of their bits.
             atomicMax(&state.reached, bitcast<u32>(looks[i].bound));
-            halves = looks[i].kind == WHOLE;
+            halves = kind(looks[i]) == WHOLE;
         }
     }
 
@@ -69,7 +68,7 @@ fn draw(@builtin(global_invocation_id) thread: vec3u, @builtin(local_invocation_
 
     let first = bases[0] + before.x;
     var triangle = bases[1] + before.y;
-    let side = 1u << (30u - (places[i].level & 0xffu));
+    let side = 1u << (30u - (looks[i].kind >> 8u));
     let corner = places[i].at * side;
     if halves {
         put(first, corner);

@@ -1,20 +1,25 @@
-// The passes of a level, each over its whole list: what would be drawn is counted, the tolerance settled, room reserved for the children of what is cut, and
-// the children linked, looked at already.
+// The passes of a level: *count* what would be drawn of its list at which tolerance, *settle* the tolerance, and *cut* what is worth it, whose children are looked at
+// at once. The first levels, of no more cells than a workgroup has threads, are done in one pass.
 
 // For each bin of tolerances: how many more triangles there are below it than above.
 @group(0) @binding(8) var<storage, read_write> bins: array<atomic<i32>>;
 // Workgroups that go over the next level's list, and over all lists.
 @group(1) @binding(0) var<storage, read_write> workgroups: array<u32, 6>;
 
+// Threads of a workgroup, and levels that have no more cells than that.
+const THREADS = 256u;
+const FIRST_LEVELS = 5u;
+
 // Bits of a number that do not tell bins apart: 256 bins to an octave.
 const SHIFT = 15u;
 const BINS = (INFINITE >> SHIFT) + 1u;
 
+// What a workgroup has to add to the count of triangles; cells that it cuts; where it puts their children.
 var<workgroup> triangles: atomic<i32>;
 var<workgroup> taken: atomic<u32>;
 var<workgroup> base: u32;
 
-// So many triangles are there at tolerances (pixels) below one. The sum over a workgroup is added by `count_all`.
+// So many triangles are there at tolerances (pixels) below one. The workgroup's sum is handed on by `hand_on`.
 fn add(below: f32, number: i32) {
     if number != 0 {
         atomicAdd(&bins[bitcast<u32>(below) >> SHIFT], number);
@@ -22,45 +27,14 @@ fn add(below: f32, number: i32) {
     }
 }
 
-fn count_all(local: u32) {
+fn hand_on(local: u32) {
     workgroupBarrier();
     if local == 0u {
-        let sum = atomicLoad(&triangles);
+        let sum = atomicExchange(&triangles, 0);
         if sum != 0 {
             atomicAdd(&state.count, sum);
         }
     }
-}
-
-fn dispatch(next: u32, all: u32) {
-    // At least one, so that the passes after an empty level find what they need.
-    workgroups[0] = max((next + 255u) / 256u, 1u);
-    workgroups[1] = 1u;
-    workgroups[2] = 1u;
-    workgroups[3] = max((all + 255u) / 256u, 1u);
-    workgroups[4] = 1u;
-    workgroups[5] = 1u;
-}
-
-@compute @workgroup_size(1)
-fn begin() {
-    state.tolerance = sight.tolerance;
-    atomicStore(&state.candidates, 0u);
-    atomicStore(&state.used, 1u);
-    atomicStore(&state.vertices, 0u);
-    atomicStore(&state.reached, 0u);
-    state.firsts[0] = 0u;
-    state.firsts[1] = 1u;
-    places[0] = Place(vec2u(0u), ABSENT, 0u);
-    beside[0] = vec4u(BORDER);
-    let whole = look(vec2u(0u), 0u, bitcast<f32>(LARGEST));
-    looks[0] = whole;
-    atomicStore(&state.count, 0);
-    if whole.kind == WHOLE {
-        atomicStore(&bins[LARGEST >> SHIFT], 2);
-        atomicStore(&state.count, 2);
-    }
-    dispatch(1u, 1u);
 }
 
 // The cell beyond a side.
@@ -73,52 +47,86 @@ fn beyond(at: vec2u, side: u32) -> vec2u {
     }
 }
 
-@compute @workgroup_size(256)
-fn count(@builtin(global_invocation_id) thread: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = state.firsts[here.number] + thread.x;
+// The child that lies beyond a side of its parent: of the cell there, if that is cut.
+fn across(neighbour: u32, child: u32) -> u32 {
+    let other = neighbour & ~OPEN;
+    if other >= BORDER {
+        return other;
+    }
+    let children = places[other].children;
+    return select(children + child, ABSENT, children == ABSENT);
+}
+
+// The places of the cells beyond a cell's sides.
+fn around(i: u32, level: u32) -> vec4u {
+    if level == 0u {
+        return vec4u(BORDER);
+    }
+    let place = places[i];
+    let sides = beside[place.parent];
+    let first = places[place.parent].children;
+    let k = i - first;
+    // Beyond two sides are siblings, beyond the others children of the parent's neighbours.
+    var cells = vec4u(first + (k ^ 2u), first + (k ^ 1u), first + (k ^ 2u), first + (k ^ 1u));
+    if (k & 2u) == 0u {
+        cells.x = across(sides.x, k ^ 2u);
+    } else {
+        cells.z = across(sides.z, k ^ 2u);
+    }
+    if (k & 1u) == 1u {
+        cells.y = across(sides.y, k ^ 1u);
+    } else {
+        cells.w = across(sides.w, k ^ 1u);
+    }
+    return cells;
+}
+
+// Tells the census what cutting a cell changes, and finds the sides over which slivers may stand.
+fn count_cell(i: u32, level: u32, local: u32) {
     let tolerance = state.tolerance;
-    if i < state.firsts[here.number + 1u] && here.number < sight.finest && looks[i].pixels > tolerance {
-        let look = looks[i];
+    if i < atomicLoad(&state.used) && looks[i].pixels > tolerance {
+        let seen = looks[i];
         atomicAdd(&taken, 1u);
-        var more = select(0, -2, look.kind == WHOLE);
-        var open = 0u;
+        var more = select(0, -2, kind(seen) == WHOLE);
+        var sides = around(i, level);
         for (var side = 0u; side < 4u; side++) {
-            let index = beside[i][side];
+            let index = sides[side];
             var closes = false;
             if index == ABSENT {
                 // Where nothing is drawn beyond, nothing has to be closed.
-                let land = facts(beyond(places[i].at, side), here.number);
+                let land = facts(beyond(places[i].at, side), level);
                 closes = land.exists && land.whole;
             } else if index != BORDER {
                 let other = looks[index];
-                if other.kind == WHOLE && other.pixels > tolerance {
-                    add(min(look.pixels, other.pixels), -1);
+                if kind(other) == WHOLE && other.pixels > tolerance {
+                    add(min(seen.pixels, other.pixels), -1);
                 }
-                closes = other.kind == WHOLE || other.kind == UNSEEN;
+                closes = kind(other) == WHOLE || kind(other) == UNSEEN;
             }
             if closes {
                 more += 1;
-                open |= 1u << side;
+                sides[side] |= OPEN;
             }
         }
-        add(look.pixels, more);
-        places[i].level = here.number | (open << 8u);
+        add(seen.pixels, more);
+        beside[i] = sides;
     }
-    count_all(local);
+    hand_on(local);
     if local == 0u {
-        let cut = atomicLoad(&taken);
-        if cut > 0u {
-            atomicAdd(&state.candidates, cut);
+        let candidates = atomicExchange(&taken, 0u);
+        if candidates > 0u {
+            atomicAdd(&state.candidates, candidates);
         }
     }
 }
 
-// Of each of the 256 parts that the bins are dealt out to, from the largest tolerances down: the sum, and the greatest sum from its beginning.
-const PART = (BINS + 255u) / 256u;
-var<workgroup> sums: array<i32, 256>;
-var<workgroup> peaks: array<i32, 256>;
-var<workgroup> bound_to_rise: u32;
-var<workgroup> fitting: atomic<u32>;
+// Of each of the parts that the bins are dealt out to, from the largest tolerances down: the sum, and the greatest sum from its beginning.
+const PART = (BINS + THREADS - 1u) / THREADS;
+var<workgroup> sums: array<i32, THREADS>;
+var<workgroup> peaks: array<i32, THREADS>;
+// Whether there are too many triangles (1), and too many cells (2).
+var<workgroup> excess: u32;
+var<workgroup> cut: atomic<u32>;
 var<workgroup> bin: u32;
 
 // The number of triangles in the bin that is so far from the last.
@@ -129,46 +137,55 @@ fn from_top(i: u32) -> i32 {
     return atomicLoad(&bins[BINS - 1u - i]);
 }
 
-// Raises the tolerance until it takes no more triangles than allowed, and no more children than there is room for.
-@compute @workgroup_size(256)
-fn settle(@builtin(local_invocation_index) local: u32) {
-    let first = state.firsts[here.number];
-    let end = state.firsts[here.number + 1u];
-    if local == 0u {
-        let free = (sight.room - atomicLoad(&state.used)) / 4u;
-        let candidates = atomicLoad(&state.candidates);
-        bound_to_rise = select(0u, 1u, atomicLoad(&state.count) > i32(sight.most)) | select(0u, 2u, candidates > free);
-        atomicStore(&state.candidates, 0u);
+// The least bin such that no more than so many cells of a list are cut, if those in bins above it are.
+fn fitting(first: u32, end: u32, most: u32, local: u32) -> u32 {
+    var least = 0u;
+    for (var bit = 0x8000u; bit > 0u; bit >>= 1u) {
+        if local == 0u {
+            atomicStore(&cut, 0u);
+        }
+        workgroupBarrier();
+        for (var i = first + local; i < end; i += THREADS) {
+            if (bitcast<u32>(looks[i].pixels) >> SHIFT) >= least + bit {
+                atomicAdd(&cut, 1u);
+            }
+        }
+        workgroupBarrier();
+        if local == 0u {
+            bin = select(least + bit, least, atomicLoad(&cut) <= most);
+        }
+        least = workgroupUniformLoad(&bin);
     }
-    let why = workgroupUniformLoad(&bound_to_rise);
+    return least;
+}
+
+// Raises the tolerance until it takes no more triangles than allowed, and no more children than there is room for.
+fn settle_level(level: u32, local: u32) {
+    let first = state.firsts[level];
+    let end = atomicLoad(&state.used);
+    let free = (sight.room - end) / 4u;
+    if local == 0u {
+        let candidates = atomicExchange(&state.candidates, 0u);
+        excess = select(0u, 1u, atomicLoad(&state.count) > i32(sight.most)) | select(0u, 2u, candidates > free);
+        // The next list begins where this one ends, and is no longer than this.
+        let children = 4u * min(candidates, free);
+        state.firsts[level + 1u] = end;
+        workgroups[0] = max((children + THREADS - 1u) / THREADS, 1u);
+        workgroups[1] = 1u;
+        workgroups[2] = 1u;
+        workgroups[3] = (end + children + THREADS - 1u) / THREADS;
+        workgroups[4] = 1u;
+        workgroups[5] = 1u;
+    }
+    let why = workgroupUniformLoad(&excess);
     if why == 0u {
         return;
     }
-
-    // The least bin at which the children fit: what is cut lies in bins above it.
     var least = 0u;
     if (why & 2u) != 0u {
-        let free = (sight.room - atomicLoad(&state.used)) / 4u;
-        for (var bit = 0x8000u; bit > 0u; bit >>= 1u) {
-            if local == 0u {
-                atomicStore(&fitting, 0u);
-            }
-            workgroupBarrier();
-            let below = least + bit - 1u;
-            for (var i = first + local; i < end; i += 256u) {
-                if (bitcast<u32>(looks[i].pixels) >> SHIFT) > below && looks[i].pixels > state.tolerance {
-                    atomicAdd(&fitting, 1u);
-                }
-            }
-            workgroupBarrier();
-            if local == 0u {
-                bin = select(least + bit, least, atomicLoad(&fitting) <= free);
-            }
-            least = workgroupUniformLoad(&bin);
-        }
+        least = fitting(first, end, free, local);
     }
 
-    // The first bin, from the largest tolerance down, at which there would be too many triangles.
     var sum = 0;
     var peak = -0x7fffffff;
     for (var i = local * PART; i < (local + 1u) * PART; i++) {
@@ -179,10 +196,11 @@ fn settle(@builtin(local_invocation_index) local: u32) {
     peaks[local] = peak;
     workgroupBarrier();
     if local == 0u {
+        // The first bin, from the largest tolerance down, with which there would be too many triangles.
         let most = i32(sight.most);
         var count = 0;
         var part = 0u;
-        while part < 256u && count + peaks[part] <= most {
+        while part < THREADS && count + peaks[part] <= most {
             count += sums[part];
             part += 1u;
         }
@@ -191,88 +209,109 @@ fn settle(@builtin(local_invocation_index) local: u32) {
             count += from_top(i);
             i += 1u;
         }
-        bin = BINS - 1u - min(i, BINS - 1u);
-        // Fewer still, if room for cells asks for that.
-        while bin < least {
-            bin += 1u;
-            count -= atomicLoad(&bins[bin]);
+        var last = BINS - 1u - min(i, BINS - 1u);
+        while last < least {
+            last += 1u;
+            count -= atomicLoad(&bins[last]);
         }
+        bin = last;
         atomicStore(&state.count, count);
-        state.tolerance = max(state.tolerance, bitcast<f32>(((bin + 1u) << SHIFT) - 1u));
+        state.tolerance = max(state.tolerance, bitcast<f32>(((last + 1u) << SHIFT) - 1u));
     }
     // What is below the new tolerance is no more.
     let last = workgroupUniformLoad(&bin);
-    for (var i = local; i <= last; i += 256u) {
+    for (var i = local; i <= last; i += THREADS) {
         atomicStore(&bins[i], 0);
     }
 }
 
-@compute @workgroup_size(256)
-fn reserve(@builtin(global_invocation_id) thread: vec3u, @builtin(local_invocation_index) local: u32) {
-    let i = state.firsts[here.number] + thread.x;
-    let is_cut = i < state.firsts[here.number + 1u] && looks[i].pixels > state.tolerance;
+// Cuts a cell if that is worth it: reserves room for its children, and looks at them.
+fn cut_cell(i: u32, level: u32, local: u32) {
+    let is_cut = i < state.firsts[level + 1u] && looks[i].pixels > state.tolerance;
     var before = 0u;
     if is_cut {
         before = atomicAdd(&taken, 4u);
     }
     workgroupBarrier();
     if local == 0u {
-        let all = atomicLoad(&taken);
+        let all = atomicExchange(&taken, 0u);
         if all > 0u {
             base = atomicAdd(&state.used, all);
         }
     }
     workgroupBarrier();
     if is_cut {
-        places[i].children = base + before;
-    }
-}
-
-// The child that lies beyond a side of a cell: of the cell's neighbour there, if that is cut.
-fn across(neighbour: u32, child: u32) -> u32 {
-    if neighbour >= BORDER {
-        return neighbour;
-    }
-    let children = places[neighbour].children;
-    return select(children + child, ABSENT, children == ABSENT);
-}
-
-// Fills the list of the level at hand with the children of what was cut on the one above, and looks at them.
-@compute @workgroup_size(256)
-fn link(@builtin(global_invocation_id) thread: vec3u, @builtin(local_invocation_index) local: u32) {
-    let end = state.firsts[here.number];
-    let i = state.firsts[here.number - 1u] + thread.x;
-    if thread.x == 0u {
-        let used = atomicLoad(&state.used);
-        state.firsts[here.number + 1u] = used;
-        dispatch(used - end, used);
-    }
-    if i < end && places[i].children != ABSENT {
-        let children = places[i].children;
-        let sides = beside[i];
+        let first = base + before;
+        places[i].children = first;
+        let corner = 2u * places[i].at;
         let above = looks[i].pixels;
         var whole = 0;
         for (var k = 0u; k < 4u; k++) {
-            // Beyond two of its sides are its siblings, beyond the others children of its parent's neighbours.
-            var around = vec4u(children + (k ^ 2u), children + (k ^ 1u), children + (k ^ 2u), children + (k ^ 1u));
-            if (k & 2u) == 0u {
-                around.x = across(sides.x, k ^ 2u);
-            } else {
-                around.z = across(sides.z, k ^ 2u);
-            }
-            if (k & 1u) == 1u {
-                around.y = across(sides.y, k ^ 1u);
-            } else {
-                around.w = across(sides.w, k ^ 1u);
-            }
-            let at = 2u * places[i].at + vec2u(k & 1u, k >> 1u);
-            let seen = look(at, here.number, above);
-            places[children + k] = Place(at, ABSENT, here.number);
-            beside[children + k] = around;
-            looks[children + k] = seen;
-            whole += select(0, 2, seen.kind == WHOLE);
+            let at = corner + vec2u(k & 1u, k >> 1u);
+            let seen = look(at, level + 1u, above);
+            places[first + k] = Place(at, i, ABSENT);
+            looks[first + k] = seen;
+            whole += select(0, 2, kind(seen) == WHOLE);
         }
         add(above, whole);
     }
-    count_all(local);
+    hand_on(local);
+}
+
+// Until everything a workgroup wrote is there for all its threads.
+fn done() {
+    storageBarrier();
+    workgroupBarrier();
+}
+
+@compute @workgroup_size(THREADS)
+fn first_levels(@builtin(local_invocation_index) local: u32) {
+    if local == 0u {
+        state.tolerance = sight.tolerance;
+        atomicStore(&state.candidates, 0u);
+        atomicStore(&state.used, 1u);
+        atomicStore(&state.vertices, 0u);
+        atomicStore(&state.reached, 0u);
+        atomicStore(&state.count, 0);
+        state.firsts[0] = 0u;
+        places[0] = Place(vec2u(0u), ABSENT, ABSENT);
+        let seen = look(vec2u(0u), 0u, bitcast<f32>(LARGEST));
+        looks[0] = seen;
+        if kind(seen) == WHOLE {
+            add(seen.above, 2);
+        }
+    }
+    hand_on(local);
+    done();
+    for (var level = 0u; level < FIRST_LEVELS; level++) {
+        let i = state.firsts[level] + local;
+        if level < sight.finest {
+            count_cell(i, level, local);
+            done();
+        }
+        settle_level(level, local);
+        done();
+        if level >= sight.finest {
+            break;
+        }
+        cut_cell(i, level, local);
+        done();
+    }
+}
+
+@compute @workgroup_size(THREADS)
+fn count(@builtin(global_invocation_id) thread: vec3u, @builtin(local_invocation_index) local: u32) {
+    count_cell(state.firsts[here.number] + thread.x, here.number, local);
+}
+
+@compute @workgroup_size(THREADS)
+fn settle(@builtin(local_invocation_index) local: u32) {
+    settle_level(here.number, local);
+}
+
+@compute @workgroup_size(THREADS)
+fn cut_level(@builtin(global_invocation_id) thread: vec3u, @builtin(local_invocation_index) local: u32) {
+    // Bound to what the land says of the level below, whose number it is told.
+    let level = here.number - 1u;
+    cut_cell(state.firsts[level] + thread.x, level, local);
 }

@@ -21,15 +21,21 @@ pub(super) struct DeviceLand {
     pub scale: (f32, f32),
     /// Bits of the heights, [`VOID`] where there is none.
     pub heights: wgpu::Texture,
-    /// By level: two numbers a cell, its range in steps (low in the lower half) and the bits of its error. Cells between four samples are told by these.
-    pub cells: Vec<wgpu::Texture>,
+    /// Two numbers a cell: its range in steps (low in the lower half) and the bits of its error. The first texture holds the levels [`TOGETHER`], one after the other from west to
+    /// east, the others one each. Cells between four samples are told by these.
+    cells: Vec<wgpu::Texture>,
 }
+
+/// Levels in the first texture of cells: small ones, so that one pass can do several.
+const TOGETHER: u8 = 6;
+
+const CELLS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 
 /// A height that is not finite.
 const VOID: u32 = f32::INFINITY.to_bits();
 
 /// Bytes that are brought to the device together.
-const TOGETHER: usize = 32 << 20;
+const BAND: usize = 32 << 20;
 
 impl DeviceLand {
     pub fn new(gpu: &Gpu, land: &Land) -> Result<DeviceLand, TooLarge> {
@@ -50,8 +56,21 @@ impl DeviceLand {
                         .map(|(i, height)| if raster.voids().is_void(first + i) { VOID } else { height.to_bits() }),
                 );
             });
-        let mut cells: Vec<wgpu::Texture> = (0..finest).map(|level| ranges_and_errors(gpu, land, level)).collect();
-        cells.push(texture(gpu, "no cells", wgpu::TextureFormat::Rg32Uint, 1, 1, |_, line| line.extend([1, 0])));
+        let first = TOGETHER.min(finest);
+        let width = (1usize << first) - 1;
+        let together = texture(gpu, "first cells", CELLS, width.max(1), width.div_ceil(2).max(1), |row, line| {
+            let begin = line.len();
+            for level in 0..first {
+                line.resize(begin + 2 * ((1 << level) - 1), 0);
+                ranges_and_errors(land, level, row, line);
+            }
+            line.resize(begin + 2 * width.max(1), 0);
+        });
+        let of_level = |level| {
+            let (columns, rows) = land.ranges().size(u32::from(finest - level));
+            texture(gpu, "cells", CELLS, columns, rows, |row, line| ranges_and_errors(land, level, row, line))
+        };
+        let cells = std::iter::once(together).chain((first..finest).map(of_level)).collect();
         let origin = land.origin();
         let size = raster.spacing() * f64::from(1u32 << finest);
         Ok(DeviceLand {
@@ -66,22 +85,28 @@ impl DeviceLand {
             cells,
         })
     }
+
+    /// The texture of the cells of a level.
+    pub fn cells(&self, level: u8) -> &wgpu::Texture {
+        let index = usize::from((level + 1).saturating_sub(TOGETHER));
+        &self.cells[index.min(self.cells.len() - 1)]
+    }
 }
 
-fn ranges_and_errors(gpu: &Gpu, land: &Land, level: u8) -> wgpu::Texture {
+/// Appends what the land says of a row of cells; of a row that it has not, nothing.
+fn ranges_and_errors(land: &Land, level: u8, row: usize, line: &mut Vec<u32>) {
     let above = u32::from(land.finest_level() - level);
     let (columns, rows) = land.ranges().size(above);
+    if row >= rows {
+        return;
+    }
     let (lows, highs) = land.ranges().steps(above);
     let (mut ranges, mut errors) = (vec![HeightRange::EMPTY; columns], vec![0.0; columns]);
-    texture(gpu, "cells", wgpu::TextureFormat::Rg32Uint, columns, rows, |row, line| {
-        land.row(Cell { face: 0, level, x: 0, y: row as u32 }, &mut ranges, &mut errors);
-        let steps = lows[row * columns..].iter().zip(&highs[row * columns..]);
-        line.extend(
-            steps
-                .zip(&errors)
-                .flat_map(|((&low, &high), error)| [u32::from(low) | u32::from(high) << 16, error.to_bits()]),
-        );
-    })
+    land.row(Cell { face: 0, level, x: 0, y: row as u32 }, &mut ranges, &mut errors);
+    let steps = lows[row * columns..].iter().zip(&highs[row * columns..]);
+    line.extend(
+        steps.zip(&errors).flat_map(|((&low, &high), error)| [u32::from(low) | u32::from(high) << 16, error.to_bits()]),
+    );
 }
 
 /// A texture of 32-bit numbers; `fill` appends those of a row.
@@ -109,7 +134,7 @@ fn texture(
     for row in 0..rows {
         fill(row, &mut numbers);
         let bytes = size_of_val(&numbers[..]);
-        if bytes < TOGETHER && row + 1 < rows {
+        if bytes < BAND && row + 1 < rows {
             continue;
         }
         let count = row + 1 - first;
