@@ -9,19 +9,24 @@ mod check;
 mod surfaces;
 
 use check::{Case, check, sorted};
-use glam::{DVec3, UVec2};
-use littoral::field::{HeightField, Land, coast};
+use glam::{DVec2, DVec3, UVec2};
+use littoral::field::{HeightField, Land, Raster, coast};
 use littoral::lod::{Drawing, Limits, Lod, Patches, Reached, ViewError};
 use littoral::picture::coast_shot;
 use littoral::space::View;
 use littoral_gpu::{Gpu, Tessellated, Tessellator};
 use std::collections::HashSet;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 pub use surfaces::{Random, Surface};
 use surfaces::{random_terrain, random_view, surface_of};
 
-fn gpu() -> Option<Gpu> {
+/// One device at a time: two that a processor stands for keep each other from its cores.
+static ONE: Mutex<()> = Mutex::new(());
+
+fn gpu() -> Option<(Gpu, MutexGuard<'static, ()>)> {
+    let alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
     match Gpu::headless() {
-        Ok(gpu) => Some(gpu),
+        Ok(gpu) => Some((gpu, alone)),
         Err(e) => {
             eprintln!("not tested: {e}");
             None
@@ -40,6 +45,11 @@ struct OnDevice<'a> {
 impl OnDevice<'_> {
     fn new<'a>(gpu: &'a Gpu, land: &Land, limits: Limits) -> OnDevice<'a> {
         OnDevice { gpu, tessellator: Tessellator::new(gpu, land, limits).expect("a small land"), told: None }
+    }
+
+    fn with_room<'a>(gpu: &'a Gpu, land: &Land, limits: Limits, cells: u64) -> OnDevice<'a> {
+        let tessellator = Tessellator::with_room(gpu, land, limits, cells).expect("a small land");
+        OnDevice { gpu, tessellator, told: None }
     }
 }
 
@@ -77,7 +87,7 @@ fn compare(land: &Land, limits: Limits, on_device: &mut OnDevice, view: &View) -
 
 #[test]
 fn the_coast_in_the_processors_triangles() {
-    let Some(gpu) = gpu() else { return };
+    let Some((gpu, _alone)) = gpu() else { return };
     let land = coast::coast();
     let (mut same, mut apart) = (0, 0);
     for triangles in [500_000, 20_000, 700] {
@@ -106,13 +116,16 @@ fn cases() -> std::ops::Range<u64> {
 
 #[test]
 fn random_lands_keep_what_methods_promise() {
-    let Some(gpu) = gpu() else { return };
+    let Some((gpu, _alone)) = gpu() else { return };
     let (mut same, mut apart, mut views) = (0, 0, 0);
     for seed in cases() {
         let mut random = Random::new(seed);
         let most = if seed % 4 == 0 { 200 } else { 70 };
         let (columns, rows) = (2 + random.below(most) as usize, 2 + random.below(most) as usize);
-        let land = random_terrain(columns, rows, &mut random);
+        let mut land = random_terrain(columns, rows, &mut random);
+        if seed % 3 == 0 {
+            land = Land::at(land.raster().clone(), DVec2::new(6.2e6, -3.1e6));
+        }
         // Coarser than the samples, as fine, or finer, which the device does not draw.
         let finest = (land.finest_level() + random.below(3) as u8).saturating_sub(1);
         let limits = Limits { finest, triangles: [300, 4_000, 20_000][random.below(3) as usize] };
@@ -132,4 +145,59 @@ fn random_lands_keep_what_methods_promise() {
     }
     eprintln!("random lands: {same} triangles drawn by both, {apart} by one of them, in {views} views");
     assert!(apart * 500 <= same, "{apart} triangles apart of {same}");
+}
+
+#[test]
+fn full_lists_raise_the_tolerance() {
+    let Some((gpu, _alone)) = gpu() else { return };
+    let coast = coast::coast();
+    let mut full = 0;
+    for seed in 0..12 {
+        let mut random = Random::new(500 + seed);
+        let land = if seed < 4 { coast.clone() } else { random_terrain(90, 60, &mut random) };
+        let limits = Limits { finest: land.finest_level(), triangles: 100_000 };
+        let room = [64, 100, 600, 2000][seed as usize % 4];
+        let surface = Surface { samples: None, ..surface_of(land.clone()) };
+        let mut on_device = OnDevice::with_room(&gpu, &land, limits, room);
+        for turn in 0..2 {
+            let view = match seed {
+                0..4 => coast_shot(UVec2::new(960, 540)).view,
+                _ => random_view(&surface, &mut random),
+            };
+            let label = format!("seed {seed} view {turn} room for {room}");
+            let case = Case { surface: &surface, view: &view, limits, label: &label };
+            check(&mut on_device, &case, &mut random);
+            let told = on_device.told.expect("told");
+            assert!(u64::from(told.cells) <= room, "{label}: {told:?}");
+            let mut wanting = OnDevice::new(&gpu, &land, limits);
+            wanting.select(&land, &view, &mut Drawing::default()).expect("a view");
+            let wanted = wanting.told.expect("told");
+            if u64::from(wanted.cells) > room {
+                full += 1;
+                // What there is room for is used.
+                assert!(told.reached.pixels >= wanted.reached.pixels && told.reached.limited, "{label}: {told:?} for {wanted:?}");
+                assert!(u64::from(told.cells) > room / 3, "{label}: {told:?}");
+            } else {
+                assert_eq!(told, wanted, "{label}");
+            }
+        }
+    }
+    assert!(full > 6, "only {full} were full");
+}
+
+#[test]
+fn views_and_lands_that_cannot_be_are_refused() {
+    let Some((gpu, _alone)) = gpu() else { return };
+    let land = random_terrain(9, 9, &mut Random::new(1));
+    let limits = Limits { finest: 30, triangles: usize::MAX };
+    let mut tessellator = Tessellator::new(&gpu, &land, limits).expect("a small land");
+    assert!(u64::from(tessellator.limit()) * 48 <= gpu.device.limits().max_buffer_size);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let view = View::looking_at(DVec3::splat(f64::NAN), DVec3::ZERO, 1.0, UVec2::new(9, 9));
+    assert_eq!(tessellator.tessellate(&gpu, &mut encoder, &view, None), Err(ViewError::NotFinite("an eye")));
+    let side = gpu.device.limits().max_texture_dimension_2d as usize + 1;
+    let raster = Raster::new(side, 2, DVec2::ONE, vec![0.0; 2 * side]).expect("valid");
+    let refused = Tessellator::new(&gpu, &Land::new(raster), limits).expect_err("too long").to_string();
+    assert!(refused.contains("draw fewer samples"), "{refused}");
+    assert!(gpu.check().is_ok(), "{:?}", gpu.check());
 }

@@ -126,8 +126,11 @@ var<workgroup> sums: array<i32, THREADS>;
 var<workgroup> peaks: array<i32, THREADS>;
 // Whether there are too many triangles (1), and too many cells (2).
 var<workgroup> excess: u32;
-var<workgroup> cut: atomic<u32>;
 var<workgroup> bin: u32;
+var<workgroup> left: atomic<i32>;
+// Cells by the upper half of the number of their bin, then by the lower one; how many are in bins above those.
+var<workgroup> tally: array<atomic<u32>, THREADS>;
+var<workgroup> above: u32;
 
 // The number of triangles in the bin that is so far from the last.
 fn from_top(i: u32) -> i32 {
@@ -137,26 +140,35 @@ fn from_top(i: u32) -> i32 {
     return atomicLoad(&bins[BINS - 1u - i]);
 }
 
-// The least bin such that no more than so many cells of a list are cut, if those in bins above it are.
+// The least bin such that no more than so many cells of a list are cut, if those in bins above it are. All of them together are more.
 fn fitting(first: u32, end: u32, most: u32, local: u32) -> u32 {
-    var least = 0u;
-    for (var bit = 0x8000u; bit > 0u; bit >>= 1u) {
-        if local == 0u {
-            atomicStore(&cut, 0u);
-        }
+    if local == 0u {
+        above = 0u;
+    }
+    var upper = 0u;
+    for (var half = 0u; half < 2u; half++) {
+        atomicStore(&tally[local], 0u);
         workgroupBarrier();
         for (var i = first + local; i < end; i += THREADS) {
-            if (bitcast<u32>(looks[i].pixels) >> SHIFT) >= least + bit {
-                atomicAdd(&cut, 1u);
+            let number = bitcast<u32>(looks[i].pixels) >> SHIFT;
+            if half == 0u {
+                atomicAdd(&tally[number >> 8u], 1u);
+            } else if number >> 8u == upper {
+                atomicAdd(&tally[number & 0xffu], 1u);
             }
         }
         workgroupBarrier();
         if local == 0u {
-            bin = select(least + bit, least, atomicLoad(&cut) <= most);
+            var part = THREADS - 1u;
+            while part > 0u && above + atomicLoad(&tally[part]) <= most {
+                above += atomicLoad(&tally[part]);
+                part -= 1u;
+            }
+            bin = part;
         }
-        least = workgroupUniformLoad(&bin);
+        upper = (upper << 8u) | workgroupUniformLoad(&bin);
     }
-    return least;
+    return upper;
 }
 
 // Raises the tolerance until it takes no more triangles than allowed, and no more children than there is room for.
@@ -209,19 +221,24 @@ fn settle_level(level: u32, local: u32) {
             count += from_top(i);
             i += 1u;
         }
-        var last = BINS - 1u - min(i, BINS - 1u);
-        while last < least {
-            last += 1u;
-            count -= atomicLoad(&bins[last]);
-        }
-        bin = last;
-        atomicStore(&state.count, count);
-        state.tolerance = max(state.tolerance, bitcast<f32>(((last + 1u) << SHIFT) - 1u));
+        bin = max(BINS - 1u - min(i, BINS - 1u), least);
+        state.tolerance = max(state.tolerance, bitcast<f32>(((bin + 1u) << SHIFT) - 1u));
+        atomicStore(&left, 0);
     }
     // What is below the new tolerance is no more.
     let last = workgroupUniformLoad(&bin);
-    for (var i = local; i <= last; i += THREADS) {
-        atomicStore(&bins[i], 0);
+    sum = 0;
+    for (var i = local; i < BINS; i += THREADS) {
+        if i <= last {
+            atomicStore(&bins[i], 0);
+        } else {
+            sum += atomicLoad(&bins[i]);
+        }
+    }
+    atomicAdd(&left, sum);
+    workgroupBarrier();
+    if local == 0u {
+        atomicStore(&state.count, atomicLoad(&left));
     }
 }
 
