@@ -175,7 +175,10 @@ fn full_lists_raise_the_tolerance() {
             if u64::from(wanted.cells) > room {
                 full += 1;
                 // What there is room for is used.
-                assert!(told.reached.pixels >= wanted.reached.pixels && told.reached.limited, "{label}: {told:?} for {wanted:?}");
+                assert!(
+                    told.reached.pixels >= wanted.reached.pixels && told.reached.limited,
+                    "{label}: {told:?} for {wanted:?}"
+                );
                 assert!(u64::from(told.cells) > room / 3, "{label}: {told:?}");
             } else {
                 assert_eq!(told, wanted, "{label}");
