@@ -8,8 +8,7 @@ use clap::ValueEnum;
 use glam::DVec3;
 use littoral::field::{HeightField, Land, Sea};
 use littoral::lod::{
-    Drawing, Limits, Lod, Mesh, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, Strips, ViewError,
-    Whole,
+    Drawing, Limits, Lod, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, Strips, ViewError, Whole,
 };
 use littoral::picture::{Meshes, Picture, Settings, Stage};
 use littoral::space::{Datum, View};
@@ -75,6 +74,7 @@ impl Method {
 pub struct Chooser<'a> {
     detail: &'a Detail,
     land: &'a Land,
+    limits: Limits,
     ground: Box<dyn Lod>,
     /// ROAM over prepared land, which goes on from picture to picture.
     flight: Option<RoamFlight<'a>>,
@@ -117,6 +117,7 @@ impl Detail {
         Some(Chooser {
             detail: self,
             land,
+            limits,
             ground: self.lod?.within(limits),
             flight: prepared.map(|bounds| RoamFlight::over(bounds, limits)),
             ground_drawing: Drawing::default(),
@@ -128,16 +129,17 @@ impl Detail {
     }
 
     /// The graphics card made ready for a stage, if it is to draw.
-    pub fn painter(&self, stage: &Stage, talk: &mut Talk) -> Result<Option<Painter>, Failure> {
+    pub fn painter(&self, stage: &Stage, sea: Option<&Sea>, talk: &mut Talk) -> Result<Option<Painter>, Failure> {
         if !self.gpu {
             return Ok(None);
         }
-        let failed = |e: PainterError| Failure::Work(format!("--gpu: {e}"));
-        let gpu = Gpu::headless().map_err(|e| failed(e.into()))?;
+        let gpu = Gpu::headless().map_err(|e| unpainted(e.into()))?;
         if gpu.is_software() {
             talk.note(format!("no graphics card: {} stands for one", gpu.adapter.name));
         }
-        Painter::new(gpu, stage).map(Some).map_err(failed)
+        let mut painter = Painter::new(gpu, stage).map_err(unpainted)?;
+        painter.set_waves(sea).map_err(unpainted)?;
+        Ok(Some(painter))
     }
 
     /// The view that the mesh is chosen for: the picture's, or another eye's on the same point.
@@ -161,13 +163,20 @@ impl Chooser<'_> {
     pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Told, Failure> {
         let view = View { tolerance_pixels: self.detail.tolerance as f32, ..*view };
         let started = Instant::now();
-        let mut told = match &mut self.flight {
-            Some(flight) => {
+        let mut told = match (&mut self.flight, &mut self.painter) {
+            (Some(flight), _) => {
                 let reached = flight.update(&view, &mut || false).map_err(refused)?;
-                Told::of(reached, flight.mesh(), started)
+                Told::of(reached, flight.mesh().triangles.len(), started)
             }
-            None => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
+            // What can look at all patches at once does it itself.
+            (None, Some(painter)) if self.detail.lod == Some(Method::Patches) => {
+                let chosen = painter.tessellate(self.land, self.limits, &view).map_err(unpainted)?;
+                Told::of(chosen.reached, chosen.triangles as usize, started)
+            }
+            _ => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
         };
+        // The graphics card has triangles of its own for the sea.
+        let sea = sea.filter(|_| !self.detail.gpu);
         self.shows_water = sea.is_some();
         if let Some(sea) = sea {
             // No cell of water is smaller than this (m).
@@ -203,10 +212,18 @@ impl Chooser<'_> {
         let Some(mut painter) = self.painter.take() else {
             return Ok(stage.render_meshes(&self.meshes(), sea, view, settings, told));
         };
-        let ground = self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh);
-        let painted = painter.picture(stage, ground, view, settings.samples, &|done| told(done));
+        if let Some(sea) = sea {
+            painter.follow_waves(sea);
+        }
+        let told = |done| told(done);
+        let painted = if self.detail.lod == Some(Method::Patches) {
+            painter.picture_of_patches(stage, view, settings.samples, &told)
+        } else {
+            let ground = self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh);
+            painter.picture(stage, ground, view, settings.samples, &told)
+        };
         self.painter = Some(painter);
-        painted.map_err(|e| Failure::Work(format!("--gpu: {e}")))
+        painted.map_err(unpainted)
     }
 
     /// What was chosen last.
@@ -219,6 +236,10 @@ impl Chooser<'_> {
     }
 }
 
+fn unpainted(error: PainterError) -> Failure {
+    Failure::Work(format!("--gpu: {error}"))
+}
+
 fn refused(error: ViewError) -> Failure {
     Failure::Work(format!("--lod: {error}"))
 }
@@ -227,16 +248,16 @@ fn refused(error: ViewError) -> Failure {
 fn choose(lod: &mut dyn Lod, field: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Told, Failure> {
     let started = Instant::now();
     let reached = lod.select(field, view, drawing).map_err(refused)?;
-    let mut told = Told::of(reached, &drawing.mesh, started);
+    let mut told = Told::of(reached, 0, started);
     drawing.expand(field);
     told.triangles = drawing.mesh.triangles.len();
     Ok(told)
 }
 
 impl Told {
-    fn of(reached: Reached, mesh: &Mesh, started: Instant) -> Told {
+    fn of(reached: Reached, triangles: usize, started: Instant) -> Told {
         Told {
-            triangles: mesh.triangles.len(),
+            triangles,
             bound_pixels: reached.pixels,
             limited: reached.limited,
             select_seconds: started.elapsed().as_secs_f64(),

@@ -206,9 +206,6 @@ impl Render {
             check_output(save, &inputs)?;
         }
 
-        if self.detail.gpu && self.sea.is_some() {
-            talk.warn("--gpu draws still water so far: --sea is not seen".to_owned());
-        }
         let state = self.sea.as_deref().map(|spec| sea::read(spec, talk)).transpose()?;
         let (reading, full, stretch) = (self.reading, self.full, self.exaggeration);
         let subject = Subject::open(&self.files, reading, full, stretch, self.water, talk)?;
@@ -227,16 +224,13 @@ impl Render {
             ..Scene::for_shot(&subject.land, subject.water.as_ref(), &shot)
         };
         let stage = Stage::new(&scene);
-        let mut sea = match self.detail.gpu {
-            true => None,
-            false => self.waves(state.as_ref(), &subject, talk)?,
-        };
+        let mut sea = self.waves(state.as_ref(), &subject, talk)?;
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
             let prepared = self.detail.prepare(stage.land());
             let mut chooser = self.detail.chooser(stage.land(), prepared.as_ref());
             if let Some(chooser) = &mut chooser {
-                chooser.paint_with(self.detail.painter(&stage, talk)?);
+                chooser.paint_with(self.detail.painter(&stage, sea.as_ref(), talk)?);
             }
             return film.run(&subject, &stage, sea.as_mut(), chooser, &settings, started, talk);
         }
@@ -244,10 +238,10 @@ impl Render {
         let mesh_view = self.detail.view(&self, &subject, &shot.view, look, talk)?;
         let waves = sea.as_ref().filter(|_| stage.shows_waves());
         let mut chooser = self.detail.chooser(stage.land(), None);
-        let chosen = chooser.as_mut().map(|chooser| chooser.choose(waves, &mesh_view)).transpose()?;
         if let Some(chooser) = &mut chooser {
-            chooser.paint_with(self.detail.painter(&stage, talk)?);
+            chooser.paint_with(self.detail.painter(&stage, sea.as_ref(), talk)?);
         }
+        let chosen = chooser.as_mut().map(|chooser| chooser.choose(waves, &mesh_view)).transpose()?;
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
         let picture = match &mut chooser {

@@ -2,6 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat2, DVec2, UVec2, Vec2, Vec3};
+use littoral::field::Finest;
+use littoral::picture::Streaks;
 use littoral::space::View;
 
 use crate::scenery::Scenery;
@@ -16,7 +18,7 @@ struct Noise {
     wavelength: f32,
     upward: f32,
     seed: u32,
-    unused: u32,
+    storey: i32,
 }
 
 /// Room for noises.
@@ -48,6 +50,8 @@ pub(crate) struct Uniforms {
     climate: [f32; 4],
     block: [f32; 4],
     floor: [f32; 4],
+    sea: [f32; 4],
+    run_up: [f32; 4],
     open: [[f32; 4]; 9],
     noise: [Noise; NOISES],
 }
@@ -70,15 +74,21 @@ struct Sound {
     /// Its wavelength (m), by which it fades out.
     wavelength: f32,
     seed: u32,
+    /// How far it has moved, in its own coordinates; of the third one only whole steps.
+    moved: DVec2,
+    storey: f64,
 }
 
-/// All noises where samples are so far apart (m), by the numbers that `natural.wgsl` and `water.wgsl` know them by.
-fn noises(spacing: f64) -> Vec<Sound> {
+/// All noises where samples are so far apart (m), and of the finest ripples of a sea at a time (s), by the numbers that `natural.wgsl`, `water.wgsl` and
+/// `wave_seen.wgsl` know them by.
+fn noises(spacing: f64, finest: Finest, time: f64) -> Vec<Sound> {
     let even = |wavelength: f64, tall: f64, seed: u32| Sound {
         matrix: DMat2::from_diagonal(DVec2::splat(1.0 / wavelength)),
         upward: tall / wavelength,
         wavelength: wavelength as f32,
         seed,
+        moved: DVec2::ZERO,
+        storey: 0.0,
     };
     let mut all = Vec::new();
     // 0: octaves of relief below the samples.
@@ -124,16 +134,36 @@ fn noises(spacing: f64) -> Vec<Sound> {
     for octave in 0..9 {
         let (s, c) = (0.35 + 0.9 * f64::from(octave)).sin_cos();
         let turned = DMat2::from_cols(DVec2::new(c, -0.55 * s), DVec2::new(s, 0.55 * c));
-        all.push(Sound { matrix: turned * (1.0 / f64::from(wavelength)), upward: 1.0, wavelength, seed: 50 + octave });
+        let matrix = turned * (1.0 / f64::from(wavelength));
+        all.push(Sound { matrix, upward: 1.0, wavelength, ..even(1.0, 0.0, 50 + octave) });
         wavelength *= 0.53;
     }
     // 42: lanes of wind.
     let lanes = DMat2::from_cols(DVec2::new(0.8, -0.6 * 2.6), DVec2::new(0.6, 0.8 * 2.6));
-    all.extend([(700.0f32, 40), (190.0, 41), (47.0, 44)].map(|(wavelength, seed)| Sound {
-        matrix: lanes * (1.0 / f64::from(wavelength)),
-        upward: 0.0,
-        wavelength,
-        seed,
+    all.extend(
+        [(700.0, 40), (190.0, 41), (47.0, 44)]
+            .map(|(wavelength, seed)| Sound { matrix: lanes * (1.0 / wavelength), ..even(wavelength, 0.0, seed) }),
+    );
+    // 45: ripples that run with the wind, as fast as gravity and tension drive them (m/s).
+    all.extend([(0.083, 0.37), (0.037, 0.26), (0.016, 0.23)].into_iter().enumerate().map(
+        |(i, (wavelength, speed))| {
+            let turn = DVec2::from_angle(finest.heading + 0.6 * i as f64 - 0.5);
+            let rise = 0.35 * speed * time / wavelength;
+            Sound {
+                moved: turn * (speed * time / wavelength),
+                upward: rise - rise.floor(),
+                storey: rise.floor(),
+                ..even(wavelength, 0.0, 90 + i as u32)
+            }
+        },
+    ));
+    // 48: foam, drawn out along the wind.
+    let streaks = Streaks::of_wind(finest.heading, finest.wind);
+    let across = streaks.along.perp();
+    let drawn = DMat2::from_cols(streaks.along / streaks.stretch, across).transpose();
+    all.extend([6.1, 2.3, 2.9, 1.1, 0.47, 0.17, 0.07].into_iter().enumerate().map(|(i, wavelength)| Sound {
+        matrix: DMat2::from_angle(1.1 * i as f64) * drawn * (1.0 / wavelength),
+        ..even(wavelength, 1.0, 70 + i as u32)
     }));
     all
 }
@@ -164,8 +194,10 @@ impl Uniforms {
         let pair = |a: DVec2, b: DVec2| [a.x as f32, a.y as f32, b.x as f32, b.y as f32];
         let place = |origin: DVec2, spacing: DVec2| pair((flat - origin) / spacing, 1.0 / spacing);
         let mut noise = [Noise::zeroed(); NOISES];
-        for (noise, sound) in noise.iter_mut().zip(noises(f64::from(scenery.mean_spacing))) {
-            let at = sound.matrix * flat;
+        let waves = scenery.waves.as_ref();
+        let (finest, time) = waves.map_or_else(Default::default, |waves| (waves.finest(), waves.time()));
+        for (noise, sound) in noise.iter_mut().zip(noises(f64::from(scenery.mean_spacing), finest, time)) {
+            let at = sound.matrix * flat - sound.moved;
             let cell = at.floor();
             let rows = sound.matrix.transpose();
             *noise = Noise {
@@ -175,7 +207,7 @@ impl Uniforms {
                 wavelength: sound.wavelength,
                 upward: sound.upward as f32,
                 seed: sound.seed,
-                unused: 0,
+                storey: sound.storey as i64 as i32,
             };
         }
         let level = scenery.level.map_or(0.0, |level| (level - eye.z) as f32);
@@ -215,6 +247,8 @@ impl Uniforms {
             floor: scenery.block.map_or([0.0; 4], |block| {
                 [(block.floor - eye.z) as f32, block.thickness as f32, 1.0, flag(scenery.is_cut_away)]
             }),
+            sea: [flag(waves.is_some()), finest.variance, 0.0, 0.0],
+            run_up: waves.map_or([0.0; 4], |waves| place(waves.run_up.1, waves.run_up.2)),
             open: scenery.open.map(|light| four(light, 0.0)),
             noise,
         }

@@ -16,6 +16,7 @@ mod scenery;
 pub mod sea;
 mod tessellator;
 mod triangles;
+mod waves;
 
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
@@ -25,3 +26,4 @@ pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
 pub use tessellator::{TESSELLATION_SHADERS, Tessellated, Tessellator};
 pub use triangles::{TooMany, Triangles};
+pub use waves::{WavesError, wave_shaders};

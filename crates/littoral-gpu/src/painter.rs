@@ -4,10 +4,12 @@ use crate::device::{Gpu, GpuError};
 use crate::frame::Look;
 use crate::renderer::Renderer;
 use crate::scenery::{Scenery, TooLarge};
+use crate::tessellator::{Tessellated, Tessellator};
 use crate::triangles::{TooMany, Triangles};
+use crate::waves::WavesError;
 use glam::{UVec2, Vec2};
-use littoral::field::HeightField;
-use littoral::lod::Mesh;
+use littoral::field::{HeightField, Land, Sea};
+use littoral::lod::{Limits, Mesh, ViewError};
 use littoral::picture::{Picture, Stage};
 use littoral::space::{Datum, View};
 
@@ -18,6 +20,8 @@ pub struct Painter {
     renderer: Renderer,
     scenery: Scenery,
     ground: Triangles,
+    /// The ground instead, and the limits that were asked for.
+    patches: Option<(Limits, Tessellator)>,
     white: [f32; 3],
 }
 
@@ -30,6 +34,9 @@ pub enum PainterError {
     /// Too many samples.
     #[error(transparent)]
     TooLarge(#[from] TooLarge),
+    /// A view of which there is no picture.
+    #[error(transparent)]
+    View(#[from] ViewError),
     /// Too many triangles.
     #[error(transparent)]
     TooMany(#[from] TooMany),
@@ -43,6 +50,9 @@ pub enum PainterError {
         /// Most pixels along a side.
         most: u32,
     },
+    /// Waves that it does not draw.
+    #[error(transparent)]
+    Waves(#[from] WavesError),
     /// Something that it does not draw.
     #[error("expected land in natural colours, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
@@ -67,7 +77,21 @@ impl Painter {
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
         gpu.check()?;
-        Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), white: tables.white })
+        Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), patches: None, white: tables.white })
+    }
+
+    /// Draws the waves of a sea where it stands, from here on; or still water.
+    ///
+    /// # Errors
+    /// If the sea is made in ways that the device does not know, or too large for it.
+    pub fn set_waves(&mut self, sea: Option<&Sea>) -> Result<(), PainterError> {
+        self.scenery.set_waves(&self.gpu, sea)?;
+        Ok(self.gpu.check()?)
+    }
+
+    /// Goes on to the instant at which the sea of [`Painter::set_waves`] stands now.
+    pub fn follow_waves(&mut self, sea: &Sea) {
+        self.scenery.follow_waves(&self.gpu, sea);
     }
 
     /// What paints.
@@ -75,7 +99,7 @@ impl Painter {
         &self.gpu
     }
 
-    /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times; water is still. `progress` is told the fraction done.
+    /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times. `progress` is told the fraction done.
     ///
     /// # Errors
     /// If the picture or the mesh is larger than the device's textures or buffers, or the device was lost.
@@ -83,6 +107,49 @@ impl Painter {
         &mut self,
         stage: &Stage,
         ground: &Mesh,
+        view: &View,
+        looks: u32,
+        progress: &dyn Fn(f32),
+    ) -> Result<Picture, PainterError> {
+        self.patches = None;
+        self.ground.set(&self.gpu, ground)?;
+        self.paint(stage, view, looks, progress)
+    }
+
+    /// Tessellates a land, that of the stage, on the device for the view that is given, which need not be the picture's: see [`Tessellator`]. The first time, and after
+    /// [`Painter::picture`], the land is brought to the device.
+    ///
+    /// # Errors
+    /// If the land is larger than the device's textures, the view is not one that a picture can be drawn of, or the device was lost.
+    pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
+        let patches = match self.patches.take() {
+            Some(patches) if patches.0 == limits => patches,
+            _ => (limits, Tessellator::new(&self.gpu, land, limits)?),
+        };
+        let (_, patches) = self.patches.insert(patches);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        patches.tessellate(&self.gpu, &mut encoder, view, None)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        Ok(patches.read(&self.gpu)?)
+    }
+
+    /// The same as [`Painter::picture`], the ground being what was tessellated last.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn picture_of_patches(
+        &mut self,
+        stage: &Stage,
+        view: &View,
+        looks: u32,
+        progress: &dyn Fn(f32),
+    ) -> Result<Picture, PainterError> {
+        self.paint(stage, view, looks, progress)
+    }
+
+    fn paint(
+        &mut self,
+        stage: &Stage,
         view: &View,
         looks: u32,
         progress: &dyn Fn(f32),
@@ -95,7 +162,7 @@ impl Painter {
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
-        self.ground.set(gpu, ground)?;
+        let ground = self.patches.as_ref().map_or(&self.ground, |(_, patches)| patches.triangles());
         let looks = looks.max(1);
         let share = 1.0 / looks as f32;
         let mut picture = Picture::empty(view.size, view.eye);
@@ -106,7 +173,7 @@ impl Painter {
             // The first through the middle; all together evenly over the pixel (M. Roberts's R2 sequence, 2018).
             let offset = (Vec2::new(0.754_877_7, 0.569_840_3) * number as f32 + 0.5).fract() - 0.5;
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            self.renderer.draw(gpu, &mut encoder, &self.scenery, &self.ground, view, Look { offset, number });
+            self.renderer.draw(gpu, &mut encoder, &self.scenery, ground, view, Look { offset, number });
             gpu.queue.submit([encoder.finish()]);
             for (i, [red, green, blue, distance]) in self.renderer.read(gpu)?.into_iter().enumerate() {
                 for (sum, seen) in picture.radiance[i].iter_mut().zip([red, green, blue]) {

@@ -4,6 +4,7 @@ use crate::device::{Gpu, GpuError};
 use crate::frame::{Look, Uniforms};
 use crate::scenery::Scenery;
 use crate::triangles::Triangles;
+use crate::waves::{WavePass, Wet};
 use glam::UVec2;
 use littoral::lod::Vertex;
 use littoral::space::View;
@@ -36,8 +37,11 @@ const RADIANCE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 #[derive(Debug)]
 struct Canvas {
     size: UVec2,
+    ground: wgpu::Texture,
     depth: wgpu::TextureView,
     radiance: wgpu::Texture,
+    /// Of no size where no waves were drawn yet.
+    wet: Wet,
 }
 
 /// Draws sceneries. Made once for a device and the format of what is drawn to.
@@ -52,6 +56,8 @@ pub struct Renderer {
     uniforms: wgpu::Buffer,
     shown: wgpu::Buffer,
     canvas: Option<Canvas>,
+    /// Made when the first waves are drawn.
+    waves: Option<WavePass>,
 }
 
 impl Renderer {
@@ -170,6 +176,7 @@ impl Renderer {
             uniforms: uniform("frame", size_of::<Uniforms>() as u64),
             shown: uniform("shown", 32),
             canvas: None,
+            waves: None,
         }
     }
 
@@ -189,9 +196,10 @@ impl Renderer {
                     view_formats: &[],
                 })
             };
-            let depth = make("depth", DEPTH, wgpu::TextureUsages::empty());
+            let ground = make("depth", DEPTH, wgpu::TextureUsages::COPY_SRC);
+            let depth = ground.create_view(&Default::default());
             let radiance = make("radiance", RADIANCE, wgpu::TextureUsages::COPY_SRC);
-            Canvas { size, depth: depth.create_view(&Default::default()), radiance }
+            Canvas { size, ground, depth, radiance, wet: Wet::new(gpu, UVec2::ONE, DEPTH) }
         }))
     }
 
@@ -207,7 +215,7 @@ impl Renderer {
     ) {
         gpu.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&Uniforms::new(scenery, view, look)));
         self.canvas(gpu, view.size);
-        let Some(canvas) = &self.canvas else { return };
+        let Some(canvas) = &mut self.canvas else { return };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surface"),
             color_attachments: &[],
@@ -234,6 +242,14 @@ impl Renderer {
             }
         }
         drop(pass);
+        if let Some(waves) = &scenery.waves {
+            let size = view.size.max(UVec2::ONE);
+            if (canvas.wet.depth.width(), canvas.wet.depth.height()) != (size.x, size.y) {
+                canvas.wet = Wet::new(gpu, size, DEPTH);
+            }
+            let passes = self.waves.get_or_insert_with(|| WavePass::new(gpu, DEPTH));
+            passes.draw(gpu, encoder, &self.uniforms, waves, scenery.land, view, &canvas.ground, &canvas.wet);
+        }
 
         let radiance = canvas.radiance.create_view(&Default::default());
         let textures = [
@@ -246,11 +262,12 @@ impl Renderer {
             &scenery.eye_through,
             &scenery.land_light,
             &scenery.skylight,
-            &scenery.sunlight,
+            &scenery.media,
             &scenery.basin,
             &scenery.rim,
-            &scenery.depths,
-            &scenery.cut,
+            scenery.waves.as_ref().map_or(&scenery.basin, |waves| &waves.run_up.0),
+            &canvas.wet.depth,
+            &canvas.wet.seen,
         ]
         .map(|texture| texture.create_view(&Default::default()));
         let mut entries = vec![
@@ -258,7 +275,7 @@ impl Renderer {
             wgpu::BindGroupEntry { binding: 6, resource: wgpu::BindingResource::Sampler(&self.sampler) },
             wgpu::BindGroupEntry { binding: 15, resource: wgpu::BindingResource::TextureView(&canvas.depth) },
         ];
-        let numbers = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 18];
+        let numbers = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 18, 19];
         entries.extend(numbers.into_iter().zip(&textures).map(|(binding, view)| wgpu::BindGroupEntry {
             binding,
             resource: wgpu::BindingResource::TextureView(view),

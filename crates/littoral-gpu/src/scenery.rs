@@ -2,8 +2,10 @@
 
 use crate::device::Gpu;
 use crate::frame::LEVELS;
+use crate::waves::{Waves, WavesError};
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
+use littoral::field::Sea;
 use littoral::picture::{Lattice, SkyTable, Slab, Tables};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{TextureDimension, TextureFormat};
@@ -13,6 +15,7 @@ use wgpu::{TextureDimension, TextureFormat};
 pub struct Scenery {
     pub(crate) fine: wgpu::Texture,
     pub(crate) coarse: wgpu::Texture,
+    /// How far samples are known; which are cut away.
     pub(crate) known: wgpu::Texture,
     pub(crate) standing: wgpu::Texture,
     pub(crate) horizon: wgpu::Texture,
@@ -20,11 +23,11 @@ pub struct Scenery {
     pub(crate) eye_through: wgpu::Texture,
     pub(crate) land_light: wgpu::Texture,
     pub(crate) skylight: wgpu::Texture,
-    pub(crate) sunlight: wgpu::Texture,
     pub(crate) basin: wgpu::Texture,
     pub(crate) rim: wgpu::Texture,
-    pub(crate) depths: wgpu::Texture,
-    pub(crate) cut: wgpu::Texture,
+    /// What water does to light, two rows; and sunlight by height, the third.
+    pub(crate) media: wgpu::Texture,
+    pub(crate) waves: Option<Waves>,
     /// Of the lattice that meshes' vertices are on (m), and metres a step.
     pub(crate) origin: DVec2,
     pub(crate) step: DVec2,
@@ -101,9 +104,16 @@ impl Scenery {
             true => floats(label, &[0.0], [1, 1, 1]),
             false => floats(label, values, map),
         };
-        let known = match tables.known.is_empty() {
-            true => make("known", TextureFormat::R8Unorm, [1, 1, 1], &[255]),
-            false => make("known", TextureFormat::R8Unorm, map, &tables.known),
+        let known = match tables.known.is_empty() && tables.cut_away.is_empty() {
+            true => make("known", TextureFormat::Rg8Unorm, [1, 1, 1], &[255, 0]),
+            false => {
+                let of = |i: usize| {
+                    let cut = tables.cut_away.get(i).is_some_and(|cut| *cut);
+                    [tables.known.get(i).copied().unwrap_or(255), 255 * u8::from(cut)]
+                };
+                let both: Vec<u8> = (0..columns * rows).flat_map(of).collect();
+                make("known", TextureFormat::Rg8Unorm, map, &both)
+            }
         };
         let nowhere = Lattice { columns: 1, rows: 1, origin: DVec2::ZERO, spacing: DVec2::ONE, values: vec![0] };
         let has_lakes = !tables.lakes.values.is_empty();
@@ -123,7 +133,10 @@ impl Scenery {
         let points = tables.skylight.values.len();
         let layers = (0..9).flat_map(|k| (0..points).map(move |i| (tables.skylight.values[i][k] * GAIN, 0.0)));
         let skylight = halves(layers);
-        let depths = tables.depths.iter().map(|d| (d.0, 0.0)).chain(tables.depths.iter().map(|d| (d.1, 0.0)));
+        let width = tables.depths.len().max(tables.sunlight.len());
+        let row = |values: Vec<Vec3>| (0..width).map(move |i| (values.get(i).copied().unwrap_or_default(), 0.0));
+        let (own, left) = (tables.depths.iter().map(|d| d.0).collect(), tables.depths.iter().map(|d| d.1).collect());
+        let media = row(own).chain(row(left)).chain(row(tables.sunlight.clone()));
         let [azimuths, elevations, distances] = Tables::SKY.map(|n| n as u32);
         let volume = |label| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -158,22 +171,10 @@ impl Scenery {
                 [tables.skylight.columns as u32, tables.skylight.rows as u32, 9],
                 bytemuck::cast_slice(&skylight),
             ),
-            sunlight: make(
-                "sunlight",
-                half,
-                [tables.sunlight.len() as u32, 1, 1],
-                bytemuck::cast_slice(&halves(tables.sunlight.iter().map(|&s| (s, 0.0)))),
-            ),
             basin: make("basin", TextureFormat::Rg8Unorm, [basin_size.x, basin_size.y, 1], &wet),
             rim: make("rim", TextureFormat::Rg32Float, rim_size, bytemuck::cast_slice(&rim)),
-            depths: make("depths", half, [tables.depths.len() as u32, 2, 1], bytemuck::cast_slice(&halves(depths))),
-            cut: match tables.cut_away.is_empty() {
-                true => make("cut", TextureFormat::R8Unorm, [1, 1, 1], &[0]),
-                false => {
-                    let cut: Vec<u8> = tables.cut_away.iter().map(|&cut| 255 * u8::from(cut)).collect();
-                    make("cut", TextureFormat::R8Unorm, map, &cut)
-                }
-            },
+            media: make("media", half, [width as u32, 3, 1], bytemuck::cast_slice(&halves(media))),
+            waves: None,
             origin: datum.0,
             step: datum.1 / (1u64 << 30) as f64,
             map_origin: finest.origin,
@@ -226,6 +227,22 @@ impl Scenery {
         self.sky_height = height;
     }
 
+    /// Draws the waves of a sea on the water, where it stands now, from here on; or still water.
+    ///
+    /// # Errors
+    /// If the sea is made in ways that the device does not know, or too large for it; then nothing changes.
+    pub fn set_waves(&mut self, gpu: &Gpu, sea: Option<&Sea>) -> Result<(), WavesError> {
+        self.waves = sea.filter(|_| self.level.is_some()).map(|sea| Waves::new(gpu, sea)).transpose()?.flatten();
+        Ok(())
+    }
+
+    /// Goes on to the instant at which the sea of [`Scenery::set_waves`] stands now.
+    pub fn follow_waves(&mut self, gpu: &Gpu, sea: &Sea) {
+        if let Some(waves) = &mut self.waves {
+            waves.follow(gpu, sea);
+        }
+    }
+
     /// Light of the sky: azimuths are slices, one after the other for each kind of scattering.
     fn write_light(&self, gpu: &Gpu, texture: &wgpu::Texture, light: &[[Vec3; 3]]) {
         let kinds = (0..3).flat_map(|kind| light.iter().map(move |light| (light[kind] * GAIN, 0.0)));
@@ -256,7 +273,7 @@ fn write(gpu: &Gpu, texture: &wgpu::Texture, bytes: &[u8]) {
 }
 
 /// A texture with its contents.
-fn texture(
+pub(crate) fn texture(
     gpu: &Gpu,
     label: &str,
     format: TextureFormat,

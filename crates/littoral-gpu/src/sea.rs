@@ -17,7 +17,8 @@
 
 mod foam;
 mod plan;
-mod sample;
+pub(crate) mod sample;
+pub(crate) mod shore;
 mod upload;
 
 use crate::{Gpu, GpuError};
@@ -27,6 +28,7 @@ use littoral::waves::WaveModel;
 use littoral::waves::cascades::{Cascades, Tile};
 use plan::Plan;
 use sample::SampleTile;
+use std::sync::{Mutex, PoisonError};
 use wgpu::util::DeviceExt;
 
 /// How the sums are made on a device. Both differ from the processor by no more than the module says, but not to the bit.
@@ -55,6 +57,8 @@ pub struct GpuSea {
     caps: Caps,
     tiles: Vec<Tile>,
     sample_tiles: Vec<SampleTile>,
+    /// Of the places that shaders ask about (m).
+    origin: Mutex<DVec2>,
     sample_buffer: wgpu::Buffer,
     sample_layout: wgpu::BindGroupLayout,
     sample_group: wgpu::BindGroup,
@@ -155,6 +159,7 @@ impl GpuSea {
             caps,
             tiles,
             sample_tiles,
+            origin: Mutex::default(),
             sample_buffer,
             sample_layout,
             sample_group,
@@ -246,7 +251,15 @@ impl GpuSea {
     /// Tells shaders how many samples tiles have.
     fn tell_samples(&mut self, of: impl Fn(&Tile) -> u32) {
         self.sample_tiles.iter_mut().zip(&self.tiles).for_each(|(to, tile)| to.samples = of(tile));
-        self.gpu.queue.write_buffer(&self.sample_buffer, 0, bytemuck::cast_slice(&self.sample_tiles));
+        self.tell_places();
+    }
+
+    /// Tells shaders where tiles are.
+    fn tell_places(&self) {
+        let origin = *self.origin.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut tiles = self.sample_tiles.clone();
+        sample::place(origin, &self.tiles, &mut tiles);
+        self.gpu.queue.write_buffer(&self.sample_buffer, 0, bytemuck::cast_slice(&tiles));
     }
 
     /// The instant it stands at (s).
@@ -255,9 +268,9 @@ impl GpuSea {
     }
 
     /// Moves the origin of the places that shaders ask about (m, east and north): best near the eye, once a frame.
-    pub fn set_origin(&mut self, origin: DVec2) {
-        sample::place(origin, &self.tiles, &mut self.sample_tiles);
-        self.gpu.queue.write_buffer(&self.sample_buffer, 0, bytemuck::cast_slice(&self.sample_tiles));
+    pub fn set_origin(&self, origin: DVec2) {
+        *self.origin.lock().unwrap_or_else(PoisonError::into_inner) = origin;
+        self.tell_places();
     }
 
     /// Its samples.
@@ -433,7 +446,7 @@ fn part(buffer: &wgpu::Buffer, size: u64) -> wgpu::BindingResource<'_> {
     wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size: wgpu::BufferSize::new(size) })
 }
 
-fn buffer(ty: wgpu::BufferBindingType, has_dynamic_offset: bool) -> wgpu::BindingType {
+pub(crate) fn buffer(ty: wgpu::BufferBindingType, has_dynamic_offset: bool) -> wgpu::BindingType {
     wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None }
 }
 
@@ -451,7 +464,7 @@ fn stored(format: wgpu::TextureFormat) -> wgpu::BindingType {
     wgpu::BindingType::StorageTexture { access, format, view_dimension: wgpu::TextureViewDimension::D2Array }
 }
 
-fn group_layout<const N: usize>(
+pub(crate) fn group_layout<const N: usize>(
     device: &wgpu::Device,
     visibility: wgpu::ShaderStages,
     types: [wgpu::BindingType; N],
@@ -466,7 +479,7 @@ fn group_layout<const N: usize>(
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("sea"), entries: &entries })
 }
 
-fn group<const N: usize>(
+pub(crate) fn group<const N: usize>(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
     resources: [wgpu::BindingResource; N],

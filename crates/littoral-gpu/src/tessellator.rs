@@ -306,9 +306,9 @@ impl Tessellator {
         &self.triangles
     }
 
-    /// Most triangles that there may be.
-    pub fn limit(&self) -> u32 {
-        self.most
+    /// The limits that it keeps: those asked for, as far as the samples and the device's buffers go.
+    pub fn limits(&self) -> Limits {
+        Limits { finest: self.finest, triangles: self.most as usize }
     }
 
     /// What a view amounts to.

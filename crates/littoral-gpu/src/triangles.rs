@@ -59,7 +59,7 @@ const VERTICES: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::Buff
 const CORNERS: wgpu::BufferUsages = wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE);
 
 /// Writes bytes into a buffer, making a new one half as large again where they do not fit.
-fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) {
+pub(crate) fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) {
     let size = bytes.len() as u64;
     let room = |buffer: &wgpu::Buffer| buffer.size() >= size;
     let buffer = match buffer.take().filter(room) {

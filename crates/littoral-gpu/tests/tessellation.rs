@@ -12,9 +12,9 @@ use check::{Case, check, sorted};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::{HeightField, Land, Raster, coast};
 use littoral::lod::{Drawing, Limits, Lod, Patches, Reached, ViewError};
-use littoral::picture::coast_shot;
+use littoral::picture::{Scene, Stage, coast_shot};
 use littoral::space::View;
-use littoral_gpu::{Gpu, Tessellated, Tessellator};
+use littoral_gpu::{Gpu, Painter, Tessellated, Tessellator};
 use std::collections::HashSet;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 pub use surfaces::{Random, Surface};
@@ -61,7 +61,7 @@ impl Lod for OnDevice<'_> {
         drawing.clear();
         drawing.mesh = self.tessellator.mesh(self.gpu).expect("a device");
         let told = self.tessellator.read(self.gpu).expect("a device");
-        assert!(told.triangles <= self.tessellator.limit(), "{told:?}");
+        assert!(told.triangles as usize <= self.tessellator.limits().triangles, "{told:?}");
         self.told = Some(told);
         Ok(told.reached)
     }
@@ -194,7 +194,7 @@ fn views_and_lands_that_cannot_be_are_refused() {
     let land = random_terrain(9, 9, &mut Random::new(1));
     let limits = Limits { finest: 30, triangles: usize::MAX };
     let mut tessellator = Tessellator::new(&gpu, &land, limits).expect("a small land");
-    assert!(u64::from(tessellator.limit()) * 48 <= gpu.device.limits().max_buffer_size);
+    assert!(tessellator.limits().triangles as u64 * 48 <= gpu.device.limits().max_buffer_size);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let view = View::looking_at(DVec3::splat(f64::NAN), DVec3::ZERO, 1.0, UVec2::new(9, 9));
     assert_eq!(tessellator.tessellate(&gpu, &mut encoder, &view, None), Err(ViewError::NotFinite("an eye")));
@@ -203,4 +203,26 @@ fn views_and_lands_that_cannot_be_are_refused() {
     let refused = Tessellator::new(&gpu, &Land::new(raster), limits).expect_err("too long").to_string();
     assert!(refused.contains("draw fewer samples"), "{refused}");
     assert!(gpu.check().is_ok(), "{:?}", gpu.check());
+}
+
+#[test]
+fn a_picture_of_patches_is_that_of_their_mesh() {
+    let Some((gpu, _alone)) = gpu() else { return };
+    let size = UVec2::new(96, 54);
+    let land = coast::coast();
+    let shot = coast_shot(size);
+    let stage = Stage::new(&Scene::for_shot(&land, None, &shot));
+    let limits = Limits { finest: land.finest_level(), triangles: 60_000 };
+    let mut drawing = Drawing::default();
+    let reached = Patches::new(limits).select(&land, &shot.view, &mut drawing).expect("a view");
+    drawing.expand(&land);
+    let mut painter = Painter::new(gpu, &stage).expect("a natural scene");
+    let told = painter.tessellate(&land, limits, &shot.view).expect("a small land");
+    assert_eq!(told.triangles as usize, drawing.mesh.triangles.len());
+    assert!((told.reached.pixels - reached.pixels).abs() < 1e-3 * reached.pixels, "{told:?} for {reached:?}");
+    let patches = painter.picture_of_patches(&stage, &shot.view, 1, &|_| {}).expect("a picture");
+    let mesh = painter.picture(&stage, &drawing.mesh, &shot.view, 1, &|_| {}).expect("a picture");
+    assert_eq!(patches.radiance, mesh.radiance);
+    assert_eq!(patches.depth, mesh.depth);
+    assert!(mesh.depth.iter().filter(|depth| **depth > 0.0).count() > 2000, "hardly any ground");
 }

@@ -2,10 +2,11 @@
 
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::Fbm;
-use littoral::field::{Lakes, Land, Raster, Water, coast};
+use littoral::field::{Lakes, Land, Raster, Sea, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Mesh, Patches};
 use littoral::picture::{Border, Display, Exposure, Scene, Settings, Stage, Style, Sun, coast_shot, overhead};
 use littoral::space::View;
+use littoral::waves::SeaState;
 use littoral_gpu::{Gpu, Painter};
 
 fn gpu() -> Option<Gpu> {
@@ -28,10 +29,10 @@ fn mesh(land: &Land, view: &View) -> Mesh {
 
 /// Compares two pictures; where `LITTORAL_PICTURES` names a folder they are written there side by side.
 /// Mean difference of displayed values, in steps of 255, and the share of pixels that differ by more than 24 steps in any channel.
-fn apart(name: &str, stage: &Stage, painter: &mut Painter, view: &View) -> (f64, f64) {
+fn apart(name: &str, stage: &Stage, painter: &mut Painter, sea: Option<&Sea>, view: &View) -> (f64, f64) {
     let mesh = mesh(stage.land(), view);
     let settings = Settings { samples: 8, ..Settings::default() };
-    let expected = stage.render(view, &settings, &|_| {});
+    let expected = stage.render_sea(sea, view, &settings, &|_| {});
     let painted = painter.picture(stage, &mesh, view, 8, &|_| {}).expect("a picture");
     let how = Display { exposure: Exposure::Grey(expected.grey()), ..Display::default() };
     let (a, b) = (expected.display(&how), painted.display(&how));
@@ -71,10 +72,31 @@ fn the_coast_looks_as_rays_see_it() {
         let stage = Stage::new(&scene);
         let mut painter = Painter::new(gpu.clone(), &stage).expect("a natural scene");
         for view in views {
-            let (mean, far) = apart(name, &stage, &mut painter, view);
+            let (mean, far) = apart(name, &stage, &mut painter, None, view);
             eprintln!("{name}: mean difference {mean:.2} of 255, {:.2} % of pixels far off", 100.0 * far);
             assert!(mean < 4.0 && far < 0.02, "{name}: {mean} of 255 in the mean, {far} of pixels far off");
         }
+    }
+}
+
+#[test]
+fn waves_look_as_rays_see_them() {
+    let Some(gpu) = gpu() else { return };
+    let size = UVec2::new(256, 144);
+    let land = coast::coast();
+    let water = Water::flood(&land, 0.0).expect("a sea");
+    let shot = coast_shot(size);
+    let scene = Scene::for_shot(&land, Some(&water), &shot);
+    let stage = Stage::new(&scene);
+    let mut painter = Painter::new(gpu, &stage).expect("a natural scene");
+    let storm = SeaState::beaufort(8.0, 0.6).expect("a state");
+    for (name, state) in [("breeze", coast::sea_state()), ("storm", storm)] {
+        let mut sea = Sea::over(&land, &water, &state, &|_| true).expect("a sea");
+        sea.set_time(7.25);
+        painter.set_waves(Some(&sea)).expect("waves of tiles over a bed");
+        let (mean, far) = apart(name, &stage, &mut painter, Some(&sea), &shot.view);
+        eprintln!("{name}: mean difference {mean:.2} of 255, {:.2} % of pixels far off", 100.0 * far);
+        assert!(mean < 6.0 && far < 0.05, "{name}: {mean} of 255 in the mean, {far} of pixels far off");
     }
 }
 
@@ -130,7 +152,7 @@ fn a_block_with_missing_corners_looks_as_rays_see_it() {
     let scene = Scene { style: Style::Natural, border: Border::Cut, sun: Sun::new(4.2, 0.5), ..scene };
     let stage = Stage::new(&scene);
     let mut painter = Painter::new(gpu, &stage).expect("a natural scene");
-    let (mean, far) = apart("block", &stage, &mut painter, &view);
+    let (mean, far) = apart("block", &stage, &mut painter, None, &view);
     eprintln!("block: mean difference {mean:.2} of 255, {:.2} % of pixels far off", 100.0 * far);
     assert!(mean < 4.0 && far < 0.03, "{mean} of 255 in the mean, {far} of pixels far off");
 }

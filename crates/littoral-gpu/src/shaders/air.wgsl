@@ -7,8 +7,8 @@
 @group(0) @binding(9) var land_light: texture_3d<f32>;
 // Nine harmonics of light from all sides.
 @group(0) @binding(10) var skylight_map: texture_2d_array<f32>;
-// Sunlight by height.
-@group(0) @binding(11) var sunlight_map: texture_2d<f32>;
+// By length of path in water: its own radiance, and the share left of the bed's light; sunlight by height. A row each.
+@group(0) @binding(11) var media_map: texture_2d<f32>;
 
 const AZIMUTHS = 16.0;
 const ELEVATIONS = 160.0;
@@ -78,7 +78,7 @@ fn sky_over_land(direction: vec3f) -> vec3f {
 // Sunlight on a facing surface at a height (m): klx.
 fn sunlight(height: f32) -> vec3f {
     let at = sqrt(saturate(height / 100000.0));
-    return textureSampleLevel(sunlight_map, smooth_sampler, vec2f((at * 255.0 + 0.5) / 256.0, 0.5), 0.0).rgb;
+    return textureSampleLevel(media_map, smooth_sampler, vec2f((at * 255.0 + 0.5) / 257.0, 5.0 / 6.0), 0.0).rgb;
 }
 
 // What each of nine harmonics of light adds to the irradiance on a surface of this normal: the cosine lobe's share of it.

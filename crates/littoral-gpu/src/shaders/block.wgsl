@@ -1,8 +1,5 @@
 // The land as a block cut clean where the data ends, on a level floor: the engine's `picture::block`.
 
-// Not 0 where the land was cut away, being void from the raster's edge on.
-@group(0) @binding(18) var cut_map: texture_2d<f32>;
-
 const PLASTER_CUT = vec3f(0.300, 0.275, 0.245);
 // Reflectance of mist and of the floor.
 const MIST = 0.42;
@@ -17,7 +14,7 @@ fn is_cut_away(rel: vec2f) -> bool {
         return false;
     }
     let last = vec2i(frame.map.zw) - 1;
-    return textureLoad(cut_map, clamp(vec2i(round(sample_of(rel))), vec2i(0), last), 0).x > 0.0;
+    return textureLoad(known_map, clamp(vec2i(round(sample_of(rel))), vec2i(0), last), 0).y > 0.0;
 }
 
 // Whether the surface at a place is a side of the block: part of it is cut away.
@@ -27,8 +24,8 @@ fn is_side(rel: vec2f) -> bool {
         return false;
     }
     let ij = min(vec2i(place), vec2i(frame.map.zw) - 2);
-    let sum = textureLoad(cut_map, ij, 0).x + textureLoad(cut_map, ij + vec2i(1, 0), 0).x
-        + textureLoad(cut_map, ij + vec2i(0, 1), 0).x + textureLoad(cut_map, ij + 1, 0).x;
+    let sum = textureLoad(known_map, ij, 0).y + textureLoad(known_map, ij + vec2i(1, 0), 0).y
+        + textureLoad(known_map, ij + vec2i(0, 1), 0).y + textureLoad(known_map, ij + 1, 0).y;
     return sum > 0.0;
 }
 

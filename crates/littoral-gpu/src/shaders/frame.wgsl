@@ -6,11 +6,11 @@ struct Noise {
     // Those of the eye: lattice point, and what is left.
     cell: vec2i,
     rest: vec2f,
-    // Wavelength (m); its third coordinates a metre of height; seed.
+    // Wavelength (m); its third coordinates a metre of height; seed; whole steps of the third coordinate.
     wavelength: f32,
     upward: f32,
     seed: u32,
-    unused: u32,
+    storey: i32,
 }
 
 struct Frame {
@@ -54,6 +54,10 @@ struct Frame {
     block: vec4f,
     // Its floor over the eye (m), its thickness (m), whether there is one, whether any of it is cut away.
     floor: vec4f,
+    // Whether there are waves; variance of the slopes of ripples that none of their models has.
+    sea: vec4f,
+    // The eye among the points of the map of run-up; points a metre.
+    run_up: vec4f,
     // Harmonics of the light over an open plain.
     open: array<vec4f, 9>,
     noise: array<Noise, 56>,
@@ -69,6 +73,17 @@ const EARTH = 6371000.0;
 fn step_between(a: f32, b: f32, x: f32) -> f32 {
     let t = saturate((x - a) / (b - a));
     return t * t * (3.0 - 2.0 * t);
+}
+
+// Width of a pixel at a distance on something whose normal makes this cosine with the eye (m).
+fn footprint_of(distance: f32, cosine: f32) -> f32 {
+    return max(distance * frame.right.w * sqrt(1.0 / max(cosine, 0.02)) * 0.65, 1e-4);
+}
+
+// How far the sea has bent down below a place beyond the land (m).
+fn drop_of(rel: vec2f) -> f32 {
+    let away = rel - clamp(rel, frame.land.xy, frame.land.zw);
+    return dot(away, away) / (2.0 * EARTH);
 }
 
 fn normal_of_slope(slope: vec2f) -> vec3f {

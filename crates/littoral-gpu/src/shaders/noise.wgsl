@@ -43,7 +43,7 @@ fn cell_of(id: u32, rel: vec2f, z: f32) -> Cell {
     let n = frame.noise[id];
     let p = vec3f(n.rest + vec2f(dot(n.matrix.xy, rel), dot(n.matrix.zw, rel)), z * n.upward);
     let whole = floor(p);
-    return Cell(bitcast<vec3u>(vec3i(whole) + vec3i(n.cell, 0)), p - whole, n.seed);
+    return Cell(bitcast<vec3u>(vec3i(whole) + vec3i(n.cell, n.storey)), p - whole, n.seed);
 }
 
 fn corner_gradient(cell: Cell, corner: vec3u) -> vec3f {

@@ -1,15 +1,13 @@
 // Every pixel lit once: from how far away things are to the light they send. The engine's `picture::shade`.
 
 @group(0) @binding(15) var depth_map: texture_depth_2d;
+// The same with the sea before the ground, and what its waves are like there: see wave_seen.wgsl.
+@group(0) @binding(18) var sea_depth_map: texture_depth_2d;
+@group(0) @binding(19) var sea_map: texture_2d<u32>;
 
 @vertex
 fn everywhere(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
     return vec4f(f32(i & 1u) * 4.0 - 1.0, f32(i >> 1u) * 4.0 - 1.0, 0.0, 1.0);
-}
-
-// Width of a pixel at a distance on something whose normal makes this cosine with the eye (m).
-fn footprint_of(distance: f32, cosine: f32) -> f32 {
-    return max(distance * frame.right.w * sqrt(1.0 / max(cosine, 0.02)) * 0.65, 1e-4);
 }
 
 // Distance along a unit direction to a level surface `rise` metres below, bent with the Earth; negative for none.
@@ -48,7 +46,11 @@ fn ground_at(piece: Piece) -> Ground {
     let level = frame.water.x + frame.eye.z;
     let near_water = frame.water.y > 0.0 && (piece.z < level + 15.0 || covers(piece.rel));
     let above = select(1e9, piece.z - level, near_water);
-    let site = Site(piece.rel, piece.z, piece.footprint, above, 0.0, standing_at(piece.rel));
+    var run_up = 0.0;
+    if above > -1.0 && above < 3.0 {
+        run_up = run_up_at(piece.rel);
+    }
+    let site = Site(piece.rel, piece.z, piece.footprint, above, run_up, standing_at(piece.rel));
     return Ground(surface, natural(site, surface, broad));
 }
 
@@ -120,6 +122,10 @@ fn random_of(pixel: vec2f) -> vec2f {
 
 struct Water {
     ripples: Ripples,
+    // How much of it is foam, and where the water rests, from the eye (m).
+    foam: f32,
+    rest: vec2f,
+    footprint: f32,
     depth: f32,
     // Where the bent ray meets the bed, from the eye (m).
     under: vec2f,
@@ -133,18 +139,37 @@ struct Water {
     reach: f32,
 }
 
-fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: f32, pixel: vec2f) -> Water {
+fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: f32, pixel: vec2f, waving: bool) -> Water {
     let eye = -direction;
-    let ripples = ripples_at(rel.xy, footprint_of(distance, eye.z));
+    let footprint = footprint_of(distance, eye.z);
+    var ripples: Ripples;
+    var foam = 0.0;
+    var rest = rel.xy;
+    var raised = 0.0;
+    if waving {
+        let seen = textureLoad(sea_map, vec2i(pixel), 0);
+        let more = unpack2x16float(seen.z);
+        let across = unpack2x16float(seen.y);
+        ripples = Ripples(unpack2x16float(seen.x), vec3f(across.x, more.x, across.y) / 64.0);
+        foam = more.y;
+        rest -= unpack2x16float(seen.w);
+        raised = rel.z + drop_of(rel.xy) - frame.water.x;
+    } else {
+        ripples = ripples_at(rel.xy, footprint);
+    }
     let shown = normal_of_slope(ripples.slope);
     let within = refracted(direction, select(vec3f(0.0, 0.0, 1.0), shown, dot(shown, eye) > 0.02));
     let down = max(-within.z, 0.3);
     let aside = within.xy / down;
     var under = rel.xy;
-    var depth = max(depth_at(rel.xy), 0.0);
+    var depth = max(depth_at(rel.xy) + raised, 0.0);
     for (var i = 0; i < 3; i++) {
         under = rel.xy + aside * min(depth, 60.0);
-        depth = 0.5 * (depth + max(depth_at(under), 0.0));
+        depth = 0.5 * (depth + max(depth_at(under) + raised, 0.0));
+    }
+    if waving && depth < 0.25 {
+        // What waves carry with them as they run up a beach.
+        foam = max(foam, 0.7 * step_between(0.1, 0.8, run_up_at(rel.xy)) * (1.0 - step_between(0.0, 0.25, depth)));
     }
     var facet = normal_of_slope(seen_slope(ripples, eye, random_of(pixel)));
     if dot(facet, eye) <= 0.0 {
@@ -159,7 +184,7 @@ fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: f32, pixel: vec2f
         // Of a lake only the surface is known: its bed falls off from the shore.
         depth = min(0.07 * lake, 30.0);
     }
-    return Water(ripples, depth, under, down, lake, mirrored, fresnel(dot(facet, eye)), reach);
+    return Water(ripples, foam, rest, footprint, depth, under, down, lake, mirrored, fresnel(dot(facet, eye)), reach);
 }
 
 @fragment
@@ -176,8 +201,20 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
             return through_air(direction, direction * wall.distance, wall.distance, wall_seen(wall, direction));
         }
     }
+    var waving = false;
+    if frame.sea.x > 0.0 {
+        let sea = textureLoad(sea_depth_map, vec2i(position.xy), 0);
+        let at = across * (frame.corner.w / max(sea, 1e-12));
+        let held = !has_block() || all(at.xy >= frame.block.xy) && all(at.xy <= frame.block.zw);
+        if sea > depth && held && may_be_wet(at.xy) {
+            waving = true;
+            is_water = true;
+            rel = at;
+            distance = length(at);
+        }
+    }
     let rise = -frame.water.x;
-    if frame.water.y > 0.0 && rise > 0.0 && direction.z < 0.0 {
+    if frame.water.y > 0.0 && frame.sea.x == 0.0 && rise > 0.0 && direction.z < 0.0 {
         var t = -rise / direction.z;
         let at = direction.xy * t;
         if any(at < frame.land.xy) || any(at > frame.land.zw) {
@@ -227,7 +264,7 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
     var pieces: array<Piece, 2>;
     var wanted = vec2<bool>(false);
     if is_water {
-        water = water_at(direction, rel, distance, lake, position.xy);
+        water = water_at(direction, rel, distance, lake, position.xy, waving);
         let inside = clamp(water.under, frame.land.xy, frame.land.zw);
         let footprint = max(footprint_of(distance, -direction.z), 0.6 * length(water.under - inside));
         pieces[0] = Piece(inside, frame.water.x + frame.eye.z - water.depth, footprint);
@@ -277,6 +314,9 @@ fn through_air(direction: vec3f, rel: vec3f, distance: f32, light: vec3f) -> vec
     return vec4f(light * air.through + air.light, distance);
 }
 
+// What fresh foam throws back (C. Whitlock, D. Bartlett, E. Gurganus 1982, beyond the blue).
+const FOAM = vec3f(0.58, 0.60, 0.62);
+
 // The light that water sends, over a bed that throws back `bed`.
 fn water_seen(water: Water, direction: vec3f, rel: vec3f, bed: vec3f, mirrored_land: vec3f) -> vec3f {
     let sun_within = -refracted(-frame.sun.xyz, vec3f(0.0, 0.0, 1.0));
@@ -296,10 +336,18 @@ fn water_seen(water: Water, direction: vec3f, rel: vec3f, bed: vec3f, mirrored_l
     }
     // The last film of water mirrors no more than wet sand.
     let film = step_between(0.0, 0.05, water.depth);
-    var light = up * ((1.0 - water.share) / 0.98) + mirrored * (water.share * (0.5 + 0.5 * film));
+    var light = up * ((1.0 - water.share) / 0.98);
     if frame.sun.z > 0.0 {
         light += sunlight(0.0) * (glitter(-direction, frame.sun.xyz, water.ripples) * film * direct_share);
     }
+    var white = 0.0;
+    if water.foam > 0.0 {
+        white = lace(water.rest, water.footprint, water.foam);
+        let normal = normal_of_slope(water.ripples.slope);
+        let sunny = sunlight(0.0) * (max(dot(normal, frame.sun.xyz), 0.0) * direct_share);
+        light = mix(light, FOAM / PI * (irradiance_open(normal) + sunny), white);
+    }
+    light += mirrored * (water.share * (0.5 + 0.5 * film) * (1.0 - white));
     let open = select(step_between(0.15, 0.85, beyond(rel.xy).wet), known_at(rel.xy), water.lake >= 0.0);
     return mix(frame.mist.rgb, light, open);
 }

@@ -1,11 +1,11 @@
-// Light on and in still water: the engine's `picture::sea`, and what of `picture::shade` belongs to it.
+// Light on and in water: the engine's `picture::sea`, and what of `picture::shade` belongs to it.
 
-// Red: not 0 where ground below the water's level is wet; green: distance to the shore of a lake in samples, over 255, 0 where there is none.
+// Red: 1 where ground below the water's level is wet, at least a half where waves may get to ground above it; green: distance to the shore of a lake in samples, over 255, 0 where there is none.
 @group(0) @binding(12) var basin_map: texture_2d<f32>;
 // Beyond the land: depth (m) and share of water, by place along the border and distance from it.
 @group(0) @binding(13) var rim_map: texture_2d<f32>;
-// By length of path: radiance of the water itself; share left of the bed's light.
-@group(0) @binding(14) var depths_map: texture_2d<f32>;
+// How high swash reaches above still water (m).
+@group(0) @binding(14) var run_up_map: texture_2d<f32>;
 
 const INDEX = 1.34;
 
@@ -15,7 +15,32 @@ fn covers(rel: vec2f) -> bool {
     if any(place < vec2f(0.0)) || any(place > frame.basin_size.xy - 1.0) {
         return frame.water.z > 0.0;
     }
-    return textureLoad(basin_map, vec2i(round(place)), 0).x > 0.0;
+    return textureLoad(basin_map, vec2i(round(place)), 0).x > 0.9;
+}
+
+// Whether waves may get to a place: it lies in still water, or on a shore that rises from it.
+fn may_be_wet(rel: vec2f) -> bool {
+    if covers(rel) {
+        return true;
+    }
+    let place = frame.basin.xy + rel * frame.basin.zw;
+    let inside = all(place >= vec2f(0.0)) && all(place <= frame.basin_size.xy - 1.0);
+    return inside && textureLoad(basin_map, vec2i(round(place)), 0).x > 0.3
+        && mean_of(sample_of(rel), 0u) >= frame.water.x + frame.eye.z;
+}
+
+// How high waves run up above still water at a place (m): 0 away from shores.
+fn run_up_at(rel: vec2f) -> f32 {
+    let p = frame.run_up.xy + rel * frame.run_up.zw;
+    let last = vec2f(textureDimensions(run_up_map)) - 1.0;
+    if frame.sea.x == 0.0 || any(p < vec2f(0.0)) || any(p > last) || any(last < vec2f(1.0)) {
+        return 0.0;
+    }
+    let ij = vec2i(min(floor(p), last - 1.0));
+    let f = p - vec2f(ij);
+    let south = mix(textureLoad(run_up_map, ij, 0).x, textureLoad(run_up_map, ij + vec2i(1, 0), 0).x, f.x);
+    let north = mix(textureLoad(run_up_map, ij + vec2i(0, 1), 0).x, textureLoad(run_up_map, ij + 1, 0).x, f.x);
+    return mix(south, north, f.y);
 }
 
 // Distance (m) to the shore of the lake at a place, negative where there is none. Its edge is the contour of the ground a few centimetres above its level.
@@ -218,12 +243,45 @@ fn ripples_at(rel: vec2f, footprint: f32) -> Ripples {
     return Ripples(slope, vec3f(variance, 0.0, variance));
 }
 
+// The x with a share of the normal distribution below it (Abramowitz and Stegun 26.2.23).
+fn quantile(share: f32) -> f32 {
+    let p = clamp(share, 1e-6, 1.0 - 1e-6);
+    let t = sqrt(-2.0 * log(min(p, 1.0 - p)));
+    let x = t - (2.515517 + t * (0.802853 + t * 0.010328)) / (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
+    return select(x, -x, p < 0.5);
+}
+
+// How much of a pixel is white where `cover` of the water about it is foam: threads and holes, carried by the water that rests at a place.
+fn lace(rest: vec2f, footprint: f32, cover: f32) -> f32 {
+    if cover <= 0.002 {
+        return 0.0;
+    }
+    var shares = array<f32, 7>(0.20, 0.14, 0.18, 0.18, 0.14, 0.09, 0.07);
+    var sum = 0.0;
+    var left = 1.0;
+    for (var i = 0u; i < 7u; i++) {
+        let shown = resolved(frame.noise[48u + i].wavelength, footprint);
+        if shown == 0.0 {
+            continue;
+        }
+        let noise = value_of(48u + i, rest, 0.31) / sqrt(0.074);
+        var score = noise;
+        if i >= 2u && i <= 4u {
+            score = quantile(2.0 - 2.0 * below(abs(noise)));
+        }
+        sum += score * shown * sqrt(shares[i]);
+        left -= shares[i] * shown * shown;
+    }
+    let soft = max(left, 0.05);
+    return below((sum * sqrt(min((1.0 - soft) / max(1.0 - left, 1e-3), 1.0)) - quantile(1.0 - cover)) / sqrt(soft));
+}
+
 // Radiance leaving the surface for irradiance just under it, over a bed of this depth that throws back `bed` of it.
 fn from_below(depth: f32, sun_cosine: f32, eye_cosine: f32, below_surface: vec3f, bed: vec3f) -> vec3f {
     let path = max(depth, 0.0) * (1.0 / sun_cosine + 1.05 / eye_cosine);
     let at = min(sqrt(path / 160.0), 1.0) * 256.0;
     let u = (at + 0.5) / 257.0;
-    let own = textureSampleLevel(depths_map, smooth_sampler, vec2f(u, 0.25), 0.0).rgb;
-    let left = textureSampleLevel(depths_map, smooth_sampler, vec2f(u, 0.75), 0.0).rgb;
+    let own = textureSampleLevel(media_map, smooth_sampler, vec2f(u, 1.0 / 6.0), 0.0).rgb;
+    let left = textureSampleLevel(media_map, smooth_sampler, vec2f(u, 0.5), 0.0).rgb;
     return (own + left * bed / PI) * below_surface * 0.54;
 }

@@ -132,6 +132,11 @@ impl Sea {
         self
     }
 
+    /// The models whose waves are added up. Ask one as [`std::any::Any`] which it is.
+    pub fn models(&self) -> impl Iterator<Item = &dyn WaveModel> {
+        self.models.iter().map(|model| model.as_ref())
+    }
+
     /// Goes to an instant (s), forward or back; what is answered there depends on that instant alone.
     pub fn set_time(&mut self, seconds: f64) {
         self.time = seconds;

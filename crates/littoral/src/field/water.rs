@@ -190,6 +190,11 @@ impl Beach {
         Some(Beach { level: water.level, higher: Water::flood(land, water.level + Beach::HIGHEST)? })
     }
 
+    /// For each sample of the land, row by row from the south: not 0 if it would lie in the water's basin, or beside it, if the water stood so much higher.
+    pub fn basin(&self) -> &[u8] {
+        self.higher.basin()
+    }
+
     /// Whether swash may get to a place (m) of that land. Ground behind the shore that is lower than still water stays dry.
     pub fn covers(&self, land: &Land, at: DVec2) -> bool {
         self.higher.covers(at) && land.height_at(at).is_some_and(|ground| f64::from(ground) >= self.level)

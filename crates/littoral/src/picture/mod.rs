@@ -40,6 +40,7 @@ mod waves;
 pub use compose::{Shot, coast_shot, compose, overhead, suiting_border};
 pub use display::{Display, Exposure, Medium, Picture};
 pub use drawn::{Meshes, mesh_errors};
+pub use sea::Streaks;
 pub use stage::Stage;
 pub use tables::{Lattice, SkyTable, Slab, Tables};
 pub use texture::{Drape, Texture};

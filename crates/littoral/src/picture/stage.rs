@@ -120,6 +120,12 @@ impl<'a> Stage<'a> {
         water.covers(at) || beach().is_some_and(|beach| beach.covers(self.scene.land, at))
     }
 
+    /// The shore that waves may wet. Not to be asked for the first time from within a parallel loop: the flood is parallel, too.
+    pub(super) fn beach(&self) -> Option<&Beach> {
+        let find = || self.scene.water.and_then(|water| Beach::of(self.scene.land, water));
+        self.beach.get_or_init(find).as_ref()
+    }
+
     /// Whether the style is that of a map, on which water is a colour.
     pub(super) fn is_map(&self) -> bool {
         matches!(self.scene.style, Style::Tint | Style::Relief)
@@ -164,9 +170,9 @@ impl<'a> Stage<'a> {
             sea: sea.filter(|_| self.shows_waves()),
             water,
         };
-        // Not by whoever of the tiles asks first: the flood is parallel, and a tile that it lets in meanwhile would wait for itself.
-        if let (Some(water), Some(_), None) = (self.scene.water, lens.sea, self.beach.get()) {
-            let _ = self.beach.set(Beach::of(self.scene.land, water));
+        // Not by whoever of the tiles asks first: a tile that the flood lets in meanwhile would wait for itself.
+        if lens.sea.is_some() {
+            self.beach();
         }
         let tiles = UVec2::new(view.size.x.div_ceil(TILE), view.size.y.div_ceil(TILE));
         let count = tiles.x as usize * tiles.y as usize;

@@ -46,7 +46,8 @@ pub struct Tables {
     pub standing: Vec<f32>,
     /// Tangent of the elevation of the horizon towards the sun, at each point of the finest level.
     pub horizon: Vec<f32>,
-    /// Where ground below the level of the water (m) is wet: at points whose value is not 0.
+    /// Where ground below the level of the water (m) is wet: at points whose value is [`Tables::BASIN`]. Ground above it may be wetted by waves where the value is that or
+    /// [`Tables::BEACH`].
     pub water: Option<(f64, Lattice<u8>)>,
     /// At the same points as the water, distance to the shore of the lake there, in samples: 0 where there is none; empty where there are no lakes.
     pub lakes: Lattice<u8>,
@@ -105,6 +106,11 @@ impl Tables {
     /// 150 m · ((1 300 000 / 150 + 1)^(i / n) − 1).
     pub const SKY: [usize; 3] = [AZIMUTHS, ELEVATIONS, DISTANCES + 1];
 
+    /// Points in the basin of the water.
+    pub const BASIN: u8 = 255;
+    /// Points that would be if it stood as high as swash is followed.
+    pub const BEACH: u8 = 128;
+
     /// Distance from the border (m) that a row of `rim` stands for, where the land's longer side is so long (m).
     pub fn distance_from_border(row: usize, side: f64) -> f64 {
         side * 1e-4 * ((row as f64 * 0.35).exp() - 1.0)
@@ -156,7 +162,15 @@ impl Stage<'_> {
             horizon,
             known: self.ground.known_samples().to_vec(),
             standing: self.ground.standing_samples().to_vec(),
-            water: scene.water.map(|water| (water.level, on_land(water.basin()))),
+            water: scene.water.map(|water| {
+                let higher = self.beach().map_or(&[][..], |beach| beach.basin());
+                let point = |(i, &low): (usize, &u8)| match (low, higher.get(i)) {
+                    (0, None | Some(0)) => 0,
+                    (0, _) => Tables::BEACH,
+                    _ => Tables::BASIN,
+                };
+                (water.level, on_land(&water.basin().iter().enumerate().map(point).collect::<Vec<u8>>()))
+            }),
             lakes: scene.lakes.map_or(Lattice::default(), |lakes| on_land(lakes.shores())),
             endless: scene.water.is_some_and(|water| water.reaches_horizon()),
             rim,

@@ -32,7 +32,7 @@ pub use measured::{Band, Entropy, Measured};
 pub use model::{BLOCK, Bounds, Motion, Points, Velocity, WaveModel};
 pub use peachey::{Beach, Depths, Path, Peachey, Surf, Swell};
 pub use sheltered::{Shelter, Sheltered};
-pub use shore::{Bed, ShoreError, ShoreSea};
+pub use shore::{Bed, ShoreError, ShoreSea, ShoreTables, ShoreWave};
 pub use sines::{Length, Sine, Sines};
 pub use spectrum::{Spectrum, kitaigorodskii};
 pub use spreading::{Fan, Spreading};

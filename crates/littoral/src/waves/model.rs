@@ -1,6 +1,7 @@
 //! What a model of waves answers.
 
 use glam::DVec2;
+use std::any::Any;
 
 /// How many points are asked about at once: as many as fill the widest vector registers.
 pub const BLOCK: usize = 16;
@@ -110,8 +111,8 @@ pub struct Bounds {
 /// A moving surface of waves over still water.
 ///
 /// A model stands at an instant ([`WaveModel::set_time`]) and answers for any points there. What it answers depends on that instant
-/// alone, never on those before it.
-pub trait WaveModel: Send + Sync {
+/// alone, never on those before it. As [`Any`], a model can be asked which one it is: renderers elsewhere work out some themselves.
+pub trait WaveModel: Any + Send + Sync {
     /// Goes to an instant (s), forward or back. Allocates nothing when warm.
     fn set_time(&mut self, seconds: f64);
 

@@ -50,6 +50,21 @@ impl Shelter {
         Ok(Shelter { origin, spacing, columns, rows, factors, steepest })
     }
 
+    /// The place of the first factor and the distances between them (m).
+    pub fn frame(&self) -> (DVec2, DVec2) {
+        (self.origin, self.spacing)
+    }
+
+    /// Factors a row, and rows.
+    pub fn size(&self) -> [usize; 2] {
+        [self.columns, self.rows]
+    }
+
+    /// The factors, row by row from the south-west.
+    pub fn factors(&self) -> &[f32] {
+        &self.factors
+    }
+
     /// The factor at a place (m) and its gradient (1/m).
     pub fn at(&self, x: f64, y: f64) -> (f32, f32, f32) {
         let (u, in_x) = within((x - self.origin.x) / self.spacing.x, self.columns);
@@ -83,6 +98,16 @@ impl Sheltered {
     /// `model` behind `shelter`.
     pub fn new(model: Box<dyn WaveModel>, shelter: Shelter) -> Sheltered {
         Sheltered { model, shelter }
+    }
+
+    /// The model, as it is where nothing shelters it.
+    pub fn model(&self) -> &dyn WaveModel {
+        self.model.as_ref()
+    }
+
+    /// What shelters it.
+    pub fn shelter(&self) -> &Shelter {
+        &self.shelter
     }
 }
 

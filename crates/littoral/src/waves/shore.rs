@@ -31,8 +31,10 @@ mod query;
 #[allow(clippy::needless_range_loop, reason = "lanes are counted over several arrays at once")]
 mod shape;
 mod solve;
+mod tables;
 
 pub use bed::{Bed, Frame, Surf};
+pub use tables::{ShoreTables, ShoreWave};
 
 use super::{BLOCK, Bounds, Motion, OutOfRange, PlaneWave, Points, SeaState, Velocity, WaveModel, components};
 use glam::DVec2;
