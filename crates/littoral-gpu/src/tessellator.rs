@@ -252,7 +252,8 @@ impl Tessellator {
         })
     }
 
-    /// Records the passes that tessellate the land for a view: [`Tessellator::triangles`] are those of the view that was recorded last before the submission.
+    /// Records the passes that tessellate the land for a view, one view a submission: [`Tessellator::triangles`] are then those of that view. `timestamps`
+    /// are written at the beginning and the end of the passes.
     ///
     /// # Errors
     /// If the view is not one that a picture can be drawn of; then nothing is recorded.
