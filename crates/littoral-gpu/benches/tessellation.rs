@@ -35,7 +35,7 @@ fn main() {
     let land = globe::land(columns);
     let all = land.finest_level();
     println!("{columns} × {} samples", columns / 2);
-    for (finest, tolerance) in [(all - 3, 1.0), (all, 1.0), (all, 0.5), (all, 0.25)] {
+    for (finest, tolerance) in [(all - 3, 1.0), (all, 1.0), (all, 0.25), (all, 0.02)] {
         let limits = Limits { finest, triangles: 1_000_000 };
         let view = globe::view(tolerance);
         let start = Instant::now();
