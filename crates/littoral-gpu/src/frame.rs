@@ -50,6 +50,10 @@ pub(crate) struct Uniforms {
     climate: [f32; 4],
     block: [f32; 4],
     floor: [f32; 4],
+    coat: [f32; 4],
+    tint: [f32; 4],
+    lake: [f32; 4],
+    drape: [f32; 4],
     sea: [f32; 4],
     run_up: [f32; 4],
     open: [[f32; 4]; 9],
@@ -211,6 +215,8 @@ impl Uniforms {
             };
         }
         let level = scenery.level.map_or(0.0, |level| (level - eye.z) as f32);
+        let drape = scenery.coat.uv_from_eye(flat);
+        let is_map = scenery.coat.kind == 1.0;
         let flag = |yes: bool| f32::from(u8::from(yes));
         Uniforms {
             clip_from_eye: clip_from_eye.to_cols_array(),
@@ -233,7 +239,7 @@ impl Uniforms {
             disc: four(scenery.disc, flag(scenery.veils_distance)),
             water: [
                 level,
-                flag(scenery.level.is_some()),
+                flag(scenery.level.is_some() && !is_map),
                 flag(scenery.endless),
                 (scenery.land.1 - scenery.land.0).max_element() as f32,
             ],
@@ -247,6 +253,10 @@ impl Uniforms {
             floor: scenery.block.map_or([0.0; 4], |block| {
                 [(block.floor - eye.z) as f32, block.thickness as f32, 1.0, flag(scenery.is_cut_away)]
             }),
+            coat: [scenery.coat.kind, scenery.floor, drape.1.x as f32, drape.1.y as f32],
+            tint: scenery.coat.tint,
+            lake: four(scenery.coat.lake, flag(scenery.level.is_some())),
+            drape: drape.0,
             sea: [flag(waves.is_some()), finest.variance, 0.0, 0.0],
             run_up: waves.map_or([0.0; 4], |waves| place(waves.run_up.1, waves.run_up.2)),
             open: scenery.open.map(|light| four(light, 0.0)),

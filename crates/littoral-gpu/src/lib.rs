@@ -8,6 +8,7 @@
 //!
 //! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
+mod coat;
 mod device;
 mod frame;
 mod painter;

@@ -10,7 +10,7 @@ use crate::waves::WavesError;
 use glam::{UVec2, Vec2};
 use littoral::field::{HeightField, Land, Sea};
 use littoral::lod::{Limits, Mesh, ViewError};
-use littoral::picture::{Picture, Stage};
+use littoral::picture::{Medium, Picture, Stage};
 use littoral::space::{Datum, View};
 
 /// Paints what views see of a stage, as [`Stage::render_meshes`] does.
@@ -23,6 +23,7 @@ pub struct Painter {
     /// The ground instead, and the limits that were asked for.
     patches: Option<(Limits, Tessellator)>,
     white: [f32; 3],
+    medium: Medium,
 }
 
 /// Why a stage cannot be painted.
@@ -54,7 +55,9 @@ pub enum PainterError {
     #[error(transparent)]
     Waves(#[from] WavesError),
     /// Something that it does not draw.
-    #[error("expected land in natural colours, got {got}: the GPU does not draw that yet; draw it on the processor")]
+    #[error(
+        "expected land on a plane in natural colours, tints or a picture, got {got}: the GPU does not draw that yet; draw it on the processor"
+    )]
     Unknown {
         /// What the stage shows.
         got: &'static str,
@@ -65,10 +68,10 @@ impl Painter {
     /// A painter of a stage.
     ///
     /// # Errors
-    /// If the stage is not in natural colours, stands on an ellipsoid, or is larger than the device's textures.
+    /// If the stage is a shaded relief, stands on an ellipsoid, or is larger than the device's textures.
     pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
         let Some(tables) = stage.tables() else {
-            return Err(PainterError::Unknown { got: "a map, or a picture laid over the ground" });
+            return Err(PainterError::Unknown { got: "a shaded relief" });
         };
         let Datum::Plane { origin, size } = stage.land().datum() else {
             return Err(PainterError::Unknown { got: "an ellipsoid" });
@@ -77,7 +80,15 @@ impl Painter {
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
         gpu.check()?;
-        Ok(Painter { gpu, renderer, scenery, ground: Triangles::default(), patches: None, white: tables.white })
+        Ok(Painter {
+            gpu,
+            renderer,
+            scenery,
+            ground: Triangles::default(),
+            patches: None,
+            white: tables.white,
+            medium: tables.medium,
+        })
     }
 
     /// Draws the waves of a sea where it stands, from here on; or still water.
@@ -167,6 +178,7 @@ impl Painter {
         let share = 1.0 / looks as f32;
         let mut picture = Picture::empty(view.size, view.eye);
         picture.white = self.white;
+        picture.medium = self.medium;
         let (corner, right, down) = view.frame();
         let width = view.size.x as usize;
         for number in 0..looks {

@@ -1,5 +1,6 @@
 //! A scene made ready for the GPU: the engine's tables as textures.
 
+use crate::coat::GpuCoat;
 use crate::device::Gpu;
 use crate::frame::LEVELS;
 use crate::waves::{Waves, WavesError};
@@ -17,8 +18,9 @@ pub struct Scenery {
     pub(crate) coarse: wgpu::Texture,
     /// How far samples are known; which are cut away.
     pub(crate) known: wgpu::Texture,
-    pub(crate) standing: wgpu::Texture,
+    /// Tangent of the horizon's elevation towards the sun; height of trees and houses (m).
     pub(crate) horizon: wgpu::Texture,
+    pub(crate) coat: GpuCoat,
     pub(crate) eye_light: wgpu::Texture,
     pub(crate) eye_through: wgpu::Texture,
     pub(crate) land_light: wgpu::Texture,
@@ -42,6 +44,7 @@ pub struct Scenery {
     pub(crate) sun_radius: f32,
     pub(crate) disc: Vec3,
     pub(crate) veils_distance: bool,
+    pub(crate) floor: f32,
     pub(crate) level: Option<f64>,
     pub(crate) endless: bool,
     pub(crate) basin_origin: DVec2,
@@ -100,10 +103,6 @@ impl Scenery {
             |label, values: &[f32], size| make(label, TextureFormat::R32Float, size, bytemuck::cast_slice(values));
         let (size, atlas, levels) = atlas(&tables.heights[1..]);
         let coarse = floats("coarse heights", &atlas, [size.x, size.y, 1]);
-        let one_or = |values: &[f32], label| match values.is_empty() {
-            true => floats(label, &[0.0], [1, 1, 1]),
-            false => floats(label, values, map),
-        };
         let known = match tables.known.is_empty() && tables.cut_away.is_empty() {
             true => make("known", TextureFormat::Rg8Unorm, [1, 1, 1], &[255, 0]),
             false => {
@@ -130,6 +129,10 @@ impl Scenery {
             false => tables.rim.values.iter().flat_map(|v| v.to_array()).collect(),
         };
         let rim_size = [tables.rim.columns.max(1) as u32, tables.rim.rows.max(2) as u32, 1];
+        let half_of = |v: f32| f16::from_f32(v.min(f32::from(f16::MAX))).to_bits();
+        let horizon: Vec<[u16; 2]> = (0..columns * rows)
+            .map(|i| [tables.horizon[i], tables.standing.get(i).copied().unwrap_or(0.0)].map(half_of))
+            .collect();
         let points = tables.skylight.values.len();
         let layers = (0..9).flat_map(|k| (0..points).map(move |i| (tables.skylight.values[i][k] * GAIN, 0.0)));
         let skylight = halves(layers);
@@ -155,8 +158,8 @@ impl Scenery {
             fine: floats("heights", &finest.values, map),
             coarse,
             known,
-            standing: one_or(&tables.standing, "standing"),
-            horizon: floats("horizon", &tables.horizon, map),
+            horizon: make("horizon", TextureFormat::Rg16Float, map, bytemuck::cast_slice(&horizon)),
+            coat: GpuCoat::new(gpu, &tables.coat),
             eye_light: volume("sky of the eye"),
             eye_through: make(
                 "air before the eye",
@@ -188,6 +191,7 @@ impl Scenery {
             sun_radius: tables.sun_radius,
             disc: tables.disc,
             veils_distance: tables.veils_distance,
+            floor: tables.floor,
             level: tables.water.as_ref().map(|water| water.0),
             endless: tables.endless,
             basin_origin: basin.origin,
@@ -227,12 +231,16 @@ impl Scenery {
         self.sky_height = height;
     }
 
-    /// Draws the waves of a sea on the water, where it stands now, from here on; or still water.
+    /// Draws the waves of a sea on the water, where it stands now, from here on; or still water. On maps water is a colour.
     ///
     /// # Errors
     /// If the sea is made in ways that the device does not know, or too large for it; then nothing changes.
     pub fn set_waves(&mut self, gpu: &Gpu, sea: Option<&Sea>) -> Result<(), WavesError> {
-        self.waves = sea.filter(|_| self.level.is_some()).map(|sea| Waves::new(gpu, sea)).transpose()?.flatten();
+        self.waves = sea
+            .filter(|_| self.level.is_some() && self.coat.kind != 1.0)
+            .map(|sea| Waves::new(gpu, sea))
+            .transpose()?
+            .flatten();
         Ok(())
     }
 
@@ -251,7 +259,7 @@ impl Scenery {
 }
 
 /// Colours as half floats, with a fourth number.
-fn halves(colours: impl Iterator<Item = (Vec3, f32)>) -> Vec<u16> {
+pub(crate) fn halves(colours: impl Iterator<Item = (Vec3, f32)>) -> Vec<u16> {
     let most = f32::from(f16::MAX);
     let half = |v: f32| f16::from_f32(v.min(most)).to_bits();
     colours.flat_map(|(c, w)| [c.x, c.y, c.z, w].map(half)).collect()

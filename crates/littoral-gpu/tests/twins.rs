@@ -1,10 +1,12 @@
 //! Pictures of the GPU against those of the processor's rays: the same light, the same ground, no cracks.
 
-use glam::{DVec2, DVec3, UVec2};
+use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 use littoral::field::noise::Fbm;
 use littoral::field::{Lakes, Land, Raster, Sea, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Mesh, Patches};
-use littoral::picture::{Border, Display, Exposure, Scene, Settings, Stage, Style, Sun, coast_shot, overhead};
+use littoral::picture::{
+    Border, Display, Drape, Exposure, Scene, Settings, Stage, Style, Sun, Texture, coast_shot, overhead,
+};
 use littoral::space::View;
 use littoral::waves::SeaState;
 use littoral_gpu::{Gpu, Painter};
@@ -101,7 +103,7 @@ fn waves_look_as_rays_see_them() {
 }
 
 #[test]
-fn the_same_picture_twice_and_nothing_from_a_map() {
+fn the_same_picture_twice_and_nothing_of_a_shaded_relief() {
     let Some(gpu) = gpu() else { return };
     let size = UVec2::new(96, 54);
     let land = coast::coast();
@@ -114,9 +116,41 @@ fn the_same_picture_twice_and_nothing_from_a_map() {
     let first = paint();
     assert_eq!(first, paint());
     assert!(first.iter().flatten().all(|v| v.is_finite()) && first.iter().any(|v| v[0] > 0.1));
-    let map = Scene { style: Style::Tint, ..scene };
-    let refused = Painter::new(gpu, &Stage::new(&map)).expect_err("maps are drawn by the processor");
-    assert!(refused.to_string().contains("natural colours"), "{refused}");
+    let map = Scene { style: Style::Relief, ..scene };
+    let refused = Painter::new(gpu, &Stage::new(&map)).expect_err("shaded reliefs are drawn by the processor");
+    assert!(refused.to_string().contains("shaded relief"), "{refused}");
+}
+
+#[test]
+fn tints_and_pictures_look_as_rays_see_them() {
+    let Some(gpu) = gpu() else { return };
+    let size = UVec2::new(256, 144);
+    let land = coast::coast();
+    let water = Water::flood(&land, 0.0);
+    let shot = coast_shot(size);
+    // Fields of some colours, not square, over most of the land.
+    let (columns, rows) = (301, 180);
+    let field = |i: u32| {
+        let (x, y) = (i % columns / 16, i / columns / 16);
+        [(x * 97 + y * 31) % 200 + 30, (x * 53 + y * 89) % 180 + 40, (x * 17 + y * 61) % 150 + 20].map(|v| v as u8)
+    };
+    let texels: Vec<[u8; 3]> = (0..columns * rows).map(field).collect();
+    let texture = Texture::from_srgb(UVec2::new(columns, rows), &texels);
+    let scale = DVec2::new(0.9, -0.9) / land.extent();
+    let uv_from_local =
+        DAffine2 { matrix2: DMat2::from_diagonal(scale), translation: DVec2::new(0.02, 0.95) - scale * land.origin() };
+    let drape = Drape { texture, uv_from_local };
+    let above = View::looking_at(shot.view.eye + DVec3::Z * 2500.0, DVec3::new(2500.0, 3500.0, 0.0), 0.9, size);
+    for (name, style, view) in
+        [("tint", Style::Tint, above), ("picture", Style::Image, above), ("picture low", Style::Image, shot.view)]
+    {
+        let scene = Scene { style, drape: Some(&drape), ..Scene::for_shot(&land, water.as_ref(), &shot) };
+        let stage = Stage::new(&scene);
+        let mut painter = Painter::new(gpu.clone(), &stage).expect("known styles");
+        let (mean, far) = apart(name, &stage, &mut painter, None, &view);
+        eprintln!("{name}: mean difference {mean:.2} of 255, {:.2} % of pixels far off", 100.0 * far);
+        assert!(mean < 4.0 && far < 0.03, "{name}: {mean} of 255 in the mean, {far} of pixels far off");
+    }
 }
 
 #[test]

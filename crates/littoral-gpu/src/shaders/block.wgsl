@@ -1,8 +1,6 @@
 // The land as a block cut clean where the data ends, on a level floor: the engine's `picture::block`.
 
 const PLASTER_CUT = vec3f(0.300, 0.275, 0.245);
-// Reflectance of mist and of the floor.
-const MIST = 0.42;
 
 fn has_block() -> bool {
     return frame.floor.z > 0.0;
@@ -133,5 +131,5 @@ fn floor_seen(rel: vec3f) -> vec3f {
         }
         sun = select(sunlight(0.0) * frame.sun.z, vec3f(0.0), hidden);
     }
-    return MIST / PI * (sky + sun);
+    return frame.coat.y / PI * (sky + sun);
 }

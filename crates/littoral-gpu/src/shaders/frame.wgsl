@@ -54,6 +54,14 @@ struct Frame {
     block: vec4f,
     // Its floor over the eye (m), its thickness (m), whether there is one, whether any of it is cut away.
     floor: vec4f,
+    // What the ground is seen as: 0 nature, 1 tints, 2 a picture; reflectance of the floor; the eye in the picture.
+    coat: vec4f,
+    // Heights of the lowest ground, of the land's foot and of the highest ground (m); by how much slopes are steepened.
+    tint: vec4f,
+    // Albedo of lakes on a map; whether there is any sea.
+    lake: vec4f,
+    // From metres to the picture: two columns.
+    drape: vec4f,
     // Whether there are waves; variance of the slopes of ripples that none of their models has.
     sea: vec4f,
     // The eye among the points of the map of run-up; points a metre.

@@ -4,9 +4,8 @@
 @group(0) @binding(1) var fine_heights: texture_2d<f32>;
 // All coarser levels side by side.
 @group(0) @binding(2) var coarse_heights: texture_2d<f32>;
-// Share known; height of trees (m); tangent of the horizon towards the sun.
+// Share known, and what was cut away; tangent of the horizon towards the sun, and height of trees (m).
 @group(0) @binding(3) var known_map: texture_2d<f32>;
-@group(0) @binding(4) var standing_map: texture_2d<f32>;
 @group(0) @binding(5) var horizon_map: texture_2d<f32>;
 
 struct Surface {
@@ -125,10 +124,10 @@ fn standing_at(rel: vec2f) -> f32 {
     }
     let ij = min(vec2i(place), vec2i(frame.map.zw) - 2);
     let uv = place - vec2f(ij);
-    let a = textureLoad(standing_map, ij, 0).x;
-    let b = textureLoad(standing_map, ij + vec2i(1, 0), 0).x;
-    let c = textureLoad(standing_map, ij + vec2i(0, 1), 0).x;
-    let d = textureLoad(standing_map, ij + 1, 0).x;
+    let a = textureLoad(horizon_map, ij, 0).y;
+    let b = textureLoad(horizon_map, ij + vec2i(1, 0), 0).y;
+    let c = textureLoad(horizon_map, ij + vec2i(0, 1), 0).y;
+    let d = textureLoad(horizon_map, ij + 1, 0).y;
     let blend = mix(mix(a, b, uv.x), mix(c, d, uv.x), uv.y);
     return max(blend, select(0.0, 0.6 * max(max(a, b), max(c, d)), blend > 0.3));
 }

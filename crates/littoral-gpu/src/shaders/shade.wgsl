@@ -39,6 +39,12 @@ struct Ground {
 // Called from one place only: it is nearly all of the shader.
 fn ground_at(piece: Piece) -> Ground {
     let surface = surface_at(piece.rel, piece.footprint);
+    if is_map() {
+        return Ground(surface, coated(tint_at(piece.rel, piece.z), surface, piece.footprint, frame.tint.w));
+    }
+    if frame.coat.x == 2.0 {
+        return Ground(surface, coated(picture_at(piece.rel, piece.footprint), surface, piece.footprint, 1.0));
+    }
     var broad = surface;
     if piece.footprint < 4.0 * frame.eye.w {
         broad = surface_at(piece.rel, 4.0 * frame.eye.w);
@@ -81,7 +87,7 @@ fn piece_seen(direction: vec3f, rel: vec3f, distance: f32) -> Piece {
         mean_of(place + vec2f(size, 0.0), level) - mean_of(place - vec2f(size, 0.0), level),
         mean_of(place + vec2f(0.0, size), level) - mean_of(place - vec2f(0.0, size), level),
     ) * frame.map.xy / (2.0 * size);
-    let footprint = footprint_of(distance, -dot(direction, normal_of_slope(slope)));
+    let footprint = footprint_of(distance, select(-dot(direction, normal_of_slope(slope)), -direction.z, is_map()));
     // The height is the data's: a mesh may lie above or below.
     return Piece(rel.xy, mean_of(place, 0u), footprint);
 }
@@ -229,7 +235,7 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
         }
     }
     var lake = -1.0;
-    if !is_water && distance < 1e29 {
+    if !is_water && distance < 1e29 && !is_map() {
         lake = lake_at(rel.xy);
         is_water = lake >= 0.0 && !is_side(rel.xy);
     }

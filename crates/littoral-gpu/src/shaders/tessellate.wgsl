@@ -206,9 +206,10 @@ fn look(at: vec2u, level: u32, above: f32) -> Look {
         seen.kind |= WHOLE;
         seen.bound = land.error * (sight.focal * (min(length(far.xy), nearest) * per_area));
     } else {
-        // No farther off than it is large.
+        // No farther off than it is large: its own size, since far from the eye the corners are rounded.
+        let size = vec3f(f32(side) * sight.step, land.high - land.low);
         seen.kind |= TORN;
-        seen.bound = sight.focal * (min(length(far), nearest) * per_area) * length(high - low);
+        seen.bound = sight.focal * (min(length(far), nearest) * per_area) * length(size);
     }
     seen.bound = min(seen.bound, bitcast<f32>(LARGEST));
     seen.pixels = min(seen.bound, above);

@@ -178,7 +178,7 @@ impl Stage<'_> {
 /// Reflectance of mist and of the floor.
 pub const MIST: f32 = 0.42;
 /// Reflectance of the floor below maps.
-const PAPER: f32 = 0.80;
+pub const PAPER: f32 = 0.80;
 
 #[cfg(test)]
 mod tests {

@@ -10,6 +10,7 @@
 //! shaded-relief image of the Island of Hawaii", USGS 92-422, 1992.
 
 use super::ground::Ground;
+use super::tables::Coat;
 use super::texture::decode_srgb;
 use crate::field::HeightRange;
 use glam::{DVec2, Vec2, Vec3};
@@ -72,6 +73,17 @@ impl Tints {
     /// Only the shades follow, as on any relief map; heights, and all that is measured, stay as they are.
     pub fn steepening(&self) -> f32 {
         (0.32 / self.slope).max(1.0)
+    }
+
+    /// The same in numbers.
+    pub fn coat(&self) -> Coat<'static> {
+        Coat::Tint {
+            land: LAND_RUN.to_vec(),
+            bed: BED_RUN.to_vec(),
+            lake: LAKE_TINT,
+            heights: [self.low, self.level.max(self.low), self.high],
+            steepening: self.steepening(),
+        }
     }
 
     /// Albedo (linear) of ground at a height (m); `wet` says whether water lies over it where it is below the level.

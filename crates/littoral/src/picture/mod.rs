@@ -42,7 +42,7 @@ pub use display::{Display, Exposure, Medium, Picture};
 pub use drawn::{Meshes, mesh_errors};
 pub use sea::Streaks;
 pub use stage::Stage;
-pub use tables::{Lattice, SkyTable, Slab, Tables};
+pub use tables::{Coat, Lattice, SkyTable, Slab, Tables};
 pub use texture::{Drape, Texture};
 
 use crate::field::{Lakes, Land, Sea, Water};

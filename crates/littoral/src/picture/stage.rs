@@ -131,6 +131,21 @@ impl<'a> Stage<'a> {
         matches!(self.scene.style, Style::Tint | Style::Relief)
     }
 
+    /// What kind of picture it makes.
+    pub(super) fn medium(&self) -> Medium {
+        match self.scene.style {
+            Style::Natural | Style::Image => Medium::Photograph,
+            Style::Tint => Medium::Model,
+            Style::Relief => Medium::Paper,
+        }
+    }
+
+    /// What is shown as white (kcd/m²).
+    pub(super) fn white(&self) -> [f32; 3] {
+        let studio = self.ground.block.is_some() || self.medium() == Medium::Model;
+        if studio { (self.mist / MIST).to_array() } else { [1.0; 3] }
+    }
+
     /// Whether waves are seen at all: there is water, and the style is not that of a map.
     pub fn shows_waves(&self) -> bool {
         self.scene.water.is_some() && !self.is_map()
@@ -189,14 +204,8 @@ impl<'a> Stage<'a> {
             })
             .collect();
         let mut picture = Picture::empty(view.size, view.eye);
-        picture.medium = match self.scene.style {
-            Style::Natural | Style::Image => Medium::Photograph,
-            Style::Tint => Medium::Model,
-            Style::Relief => Medium::Paper,
-        };
-        if self.ground.block.is_some() || picture.medium == Medium::Model {
-            picture.white = (self.mist / MIST).to_array();
-        }
+        picture.medium = self.medium();
+        picture.white = self.white();
         for (i, pixels) in rendered.iter().enumerate() {
             let corner = UVec2::new(i as u32 % tiles.x, i as u32 / tiles.x) * TILE;
             let width = (view.size.x - corner.x).min(TILE) as usize;

@@ -2,9 +2,11 @@
 
 use super::Style;
 use super::atmosphere::{AZIMUTHS, DISTANCES, ELEVATIONS, Sky};
-use super::block::MIST;
+use super::block::{MIST, PAPER};
+use super::display::Medium;
 use super::horizon::horizon;
 use super::stage::{HIGHEST_EYE, Stage};
+use super::texture::Drape;
 use glam::{DVec2, Vec2, Vec3};
 
 /// Values at the points of a lattice, row by row from the south-western one.
@@ -35,9 +37,37 @@ pub struct Slab {
     pub thickness: f64,
 }
 
+/// What the ground is seen as.
+#[derive(Clone, Debug)]
+pub enum Coat<'a> {
+    /// Grass, rock, sand and snow, as nature might have it.
+    Natural,
+    /// Tints by height, as on a map.
+    Tint {
+        /// Albedo of land: at (i / (n − 1))^(4/3) of the way from its foot to the highest ground.
+        land: Vec<Vec3>,
+        /// Albedo of ground below the water: at (i / (n − 1))^(5/3) of the way from its level to the lowest ground.
+        bed: Vec<Vec3>,
+        /// Albedo of lakes.
+        lake: Vec3,
+        /// Heights (m) of the lowest ground, of the foot of the land and of the highest ground.
+        heights: [f32; 3],
+        /// By how much slopes are steepened for the light on them.
+        steepening: f32,
+    },
+    /// A picture laid over it; grey beyond that.
+    Image(&'a Drape),
+}
+
 /// What of a scene does not depend on the eye. Light is linear Rec. 709.
 #[derive(Clone, Debug)]
-pub struct Tables {
+pub struct Tables<'a> {
+    /// What the ground is seen as.
+    pub coat: Coat<'a>,
+    /// What kind of picture it makes.
+    pub medium: Medium,
+    /// Reflectance of the floor below a block.
+    pub floor: f32,
     /// Heights (m) for shading: those of the ground, and coarser and coarser means of them, each level's points lying on every other one of the level before.
     pub heights: Vec<Lattice<f32>>,
     /// How far each point of the finest level is known, 255 for wholly; empty where all are.
@@ -97,7 +127,7 @@ pub struct SkyTable {
     pub through: Vec<Vec3>,
 }
 
-impl Tables {
+impl Tables<'_> {
     /// Height at which the air ends (m).
     pub const AIR: f32 = 100_000.0;
     /// The longest path in water (m).
@@ -121,12 +151,15 @@ impl Tables {
 const RIM: [usize; 2] = [1024, 40];
 
 impl Stage<'_> {
-    /// The stage in numbers; `None` for what only pictures by rays can show so far: maps and images laid over the ground.
-    pub fn tables(&self) -> Option<Tables> {
+    /// The stage in numbers; `None` for what only pictures by rays can show so far: shaded relief.
+    pub fn tables(&self) -> Option<Tables<'_>> {
         let scene = &self.scene;
-        if scene.style != Style::Natural {
-            return None;
-        }
+        let coat = match (scene.style, scene.drape) {
+            (Style::Relief, _) => return None,
+            (Style::Tint, _) => self.tints.coat(),
+            (Style::Image, Some(drape)) => Coat::Image(drape),
+            (Style::Natural | Style::Image, _) => Coat::Natural,
+        };
         let raster = self.ground.land.raster();
         let (origin, spacing) = (self.ground.land.origin(), raster.spacing());
         let heights: Vec<Lattice<f32>> = (0..=self.ground.levels())
@@ -159,6 +192,9 @@ impl Stage<'_> {
             Lattice { columns, rows, origin: land.0, spacing, values: values.to_vec() }
         };
         Some(Tables {
+            coat,
+            medium: self.medium(),
+            floor: if self.is_map() { PAPER } else { MIST },
             horizon,
             known: self.ground.known_samples().to_vec(),
             standing: self.ground.standing_samples().to_vec(),
@@ -183,7 +219,7 @@ impl Stage<'_> {
             sun_radius: scene.sun.angular_radius as f32,
             disc: self.sky.disc_radiance(),
             mist: (self.mist, self.ground.mist),
-            white: if self.ground.block.is_some() { (self.mist / MIST).to_array() } else { [1.0; 3] },
+            white: self.white(),
             block: self.ground.block.map(|block| block.slab()),
             cut_away: self.ground.cut_away_samples().to_vec(),
             veils_distance: scene.air.veils_distance,

@@ -50,6 +50,11 @@ impl Texture {
         self.levels[0].size
     }
 
+    /// Size and texels (linear light, row by row from the top) of every level, from the finest on: each half as large as the one before, to a single texel.
+    pub fn levels(&self) -> impl Iterator<Item = (UVec2, &[[f32; 3]])> {
+        self.levels.iter().map(|level| (level.size, &level.texels[..]))
+    }
+
     /// The mean colour about `uv` ((0, 0) top left, (1, 1) bottom right) over the parallelogram that `along` and `across`
     /// (in uv) span. Clamped at the borders.
     pub fn sample(&self, uv: DVec2, along: DVec2, across: DVec2) -> Vec3 {

@@ -1,0 +1,95 @@
+//! What the ground is seen as, on the device: nothing but nature, tints by height, or a picture laid over it.
+
+use crate::Gpu;
+use glam::{DAffine2, DVec2, UVec2, Vec3};
+use littoral::picture::{Coat, Texture};
+use wgpu::{TextureDimension, TextureFormat};
+
+/// A coat.
+#[derive(Debug)]
+pub(crate) struct GpuCoat {
+    /// Colours of tints, land in the first row and bed in the second; or the picture, with its means.
+    pub texture: wgpu::Texture,
+    /// 0 for nature, 1 for tints, 2 for a picture.
+    pub kind: f32,
+    /// Heights (m) of the lowest ground, of the land's foot and of the highest ground; by how much slopes are steepened.
+    pub tint: [f32; 4],
+    /// Albedo of lakes.
+    pub lake: Vec3,
+    /// From the land's coordinates (m) to the picture's.
+    pub uv_from_local: DAffine2,
+}
+
+impl GpuCoat {
+    /// Brings a coat to the device. Of a picture larger than its textures the finest mean that fits is taken.
+    pub fn new(gpu: &Gpu, coat: &Coat) -> GpuCoat {
+        let plain = |texture| GpuCoat {
+            texture,
+            kind: 0.0,
+            tint: [0.0, 0.0, 1.0, 1.0],
+            lake: Vec3::ZERO,
+            uv_from_local: DAffine2::IDENTITY,
+        };
+        let make = |format, size: [u32; 2], bytes: &[u8]| {
+            crate::scenery::texture(gpu, "coat", format, [size[0], size[1], 1], TextureDimension::D2, bytes)
+        };
+        match coat {
+            Coat::Natural => plain(make(TextureFormat::Rgba8Unorm, [1, 1], &[0; 4])),
+            Coat::Tint { land, bed, lake, heights: [low, foot, high], steepening } => {
+                let colours = land.iter().chain(bed).map(|&colour| (colour, 0.0));
+                let halves = crate::scenery::halves(colours);
+                let texture = make(TextureFormat::Rgba16Float, [land.len() as u32, 2], bytemuck::cast_slice(&halves));
+                let tint = [*low, *foot, *high, *steepening];
+                GpuCoat { kind: 1.0, tint, lake: *lake, ..plain(texture) }
+            }
+            Coat::Image(drape) => {
+                GpuCoat { kind: 2.0, uv_from_local: drape.uv_from_local, ..plain(picture(gpu, &drape.texture)) }
+            }
+        }
+    }
+
+    /// From the eye (m) to the picture: both columns of a matrix, and where the eye is.
+    pub fn uv_from_eye(&self, eye: DVec2) -> ([f32; 4], DVec2) {
+        let m = self.uv_from_local.matrix2;
+        let columns = [m.x_axis.x, m.x_axis.y, m.y_axis.x, m.y_axis.y];
+        (columns.map(|v| v as f32), self.uv_from_local.transform_point2(eye))
+    }
+}
+
+/// A picture with its means, as far as they fit.
+fn picture(gpu: &Gpu, texture: &Texture) -> wgpu::Texture {
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    let levels: Vec<(UVec2, &[[f32; 3]])> =
+        texture.levels().skip_while(|(size, _)| size.max_element() > most).collect();
+    let size = levels.first().map_or(UVec2::ONE, |level| level.0);
+    let made = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("drape"),
+        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        mip_level_count: levels.len().max(1) as u32,
+        sample_count: 1,
+        dimension: TextureDimension::D2,
+        format: TextureFormat::Rgba8UnormSrgb,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    for (number, (size, texels)) in levels.into_iter().enumerate() {
+        let encoded: Vec<[u8; 4]> = texels.iter().map(|t| encoded(*t)).collect();
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo { mip_level: number as u32, ..made.as_image_copy() },
+            encoded.as_flattened(),
+            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * size.x), rows_per_image: Some(size.y) },
+            wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        );
+    }
+    made
+}
+
+/// Linear light in 8 bits of sRGB (IEC 61966-2-1).
+fn encoded([red, green, blue]: [f32; 3]) -> [u8; 4] {
+    let one = |v: f32| {
+        let v = v.clamp(0.0, 1.0);
+        let shown = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        (shown * 255.0 + 0.5) as u8
+    };
+    [one(red), one(green), one(blue), 255]
+}
