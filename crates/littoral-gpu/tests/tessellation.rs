@@ -111,7 +111,7 @@ fn the_coast_in_the_processors_triangles() {
 fn cases() -> std::ops::Range<u64> {
     let number = |name| std::env::var(name).ok().and_then(|n| n.parse().ok());
     let first = number("LITTORAL_FIRST").unwrap_or(0);
-    first..first + number("LITTORAL_CASES").unwrap_or(20)
+    first..first + number("LITTORAL_CASES").unwrap_or(12)
 }
 
 #[test]
