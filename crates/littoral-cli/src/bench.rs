@@ -1,5 +1,6 @@
 //! `littoral bench`: how fast this version is on this machine.
 
+mod gpu;
 mod lod;
 
 use crate::talk::{Failure, Talk, progress, tidy};
@@ -20,7 +21,9 @@ use std::time::Instant;
 #[command(after_help = "Examples:
   littoral bench rays
   littoral bench rays --size 1025 --json
-  littoral bench lod --tolerance 2")]
+  littoral bench lod --tolerance 2
+  littoral bench gpu
+  littoral bench gpu dem.tif --size 1920x1080 --out sheet.png")]
 pub struct Bench {
     #[command(subcommand)]
     what: What,
@@ -32,6 +35,8 @@ enum What {
     Rays(Rays),
     /// All methods of detail along the same flights: triangles, true error in pixels, popping, time
     Lod(lod::Lod),
+    /// The same views by the processor and by the graphics adapter: time, and what differs
+    Gpu(gpu::GpuBench),
 }
 
 #[derive(clap::Args)]
@@ -47,6 +52,7 @@ impl Bench {
         match self.what {
             What::Rays(rays) => rays.run(talk),
             What::Lod(lod) => lod.run(talk),
+            What::Gpu(gpu) => gpu.run(talk),
         }
     }
 }

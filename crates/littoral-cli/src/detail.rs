@@ -8,7 +8,8 @@ use clap::ValueEnum;
 use glam::DVec3;
 use littoral::field::{HeightField, Land, Sea};
 use littoral::lod::{
-    Drawing, Limits, Lod, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, Strips, ViewError, Whole,
+    Drawing, Limits, Lod, Mesh, Nested, NestedBounds, Patches, Quadtree, Reached, Roam, RoamFlight, Strips, ViewError,
+    Whole,
 };
 use littoral::picture::{Meshes, Picture, Settings, Stage};
 use littoral::space::{Datum, View};
@@ -30,7 +31,8 @@ pub struct Detail {
     /// Draw the mesh's edges, too
     #[arg(long, requires = "lod", conflicts_with = "gpu", help_heading = "Mesh")]
     pub wireframe: bool,
-    /// Draw on the graphics card (or what stands for one): everything but shaded relief [default mesh: patches]
+    /// Draw on the graphics card (or what stands for one), everything but shaded relief: the exact surface by rays, or the
+    /// mesh of --lod
     #[arg(long, conflicts_with = "passes", help_heading = "Mesh")]
     pub gpu: bool,
     /// Choose the mesh for an eye at this place that looks at the same point, and look at it from --eye
@@ -81,8 +83,58 @@ pub struct Chooser<'a> {
     water: Option<Box<dyn Lod>>,
     water_drawing: Drawing,
     shows_water: bool,
-    /// What draws instead of the processor.
-    painter: Option<Painter>,
+}
+
+/// What pictures are drawn by: rays or a mesh, on the processor or the graphics card.
+pub struct Drawer<'a> {
+    /// What chooses the mesh, if one is to be drawn.
+    pub chooser: Option<Chooser<'a>>,
+    /// The graphics card, if it is to draw.
+    pub painter: Option<Painter>,
+}
+
+impl Drawer<'_> {
+    /// Chooses the meshes for a view, if such are drawn.
+    pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Option<Told>, Failure> {
+        let Some(chooser) = &mut self.chooser else { return Ok(None) };
+        match &mut self.painter {
+            // What can look at all patches at once does it itself.
+            Some(painter) if chooser.is_patches() => chooser.tessellate(painter, view),
+            _ => chooser.choose(sea, view),
+        }
+        .map(Some)
+    }
+
+    /// The picture, of what was chosen last if meshes are drawn.
+    pub fn picture(
+        &mut self,
+        stage: &Stage,
+        sea: Option<&Sea>,
+        view: &View,
+        settings: &Settings,
+        told: &(dyn Fn(f32) + Sync),
+    ) -> Result<Picture, Failure> {
+        if let Some(painter) = &mut self.painter {
+            if let Some(sea) = sea {
+                painter.follow_waves(sea);
+            }
+            let told = |done| told(done);
+            let painted = match &self.chooser {
+                Some(chooser) if chooser.is_patches() => {
+                    painter.picture_of_patches(stage, view, settings.samples, &told)
+                }
+                chooser => {
+                    let ground = chooser.as_ref().map(Chooser::ground);
+                    painter.picture(stage, ground, view, settings.samples, &told)
+                }
+            };
+            return painted.map_err(unpainted);
+        }
+        Ok(match &self.chooser {
+            Some(chooser) => stage.render_meshes(&chooser.meshes(), sea, view, settings, told),
+            None => stage.render_sea(sea, view, settings, told),
+        })
+    }
 }
 
 /// What is told about a mesh.
@@ -99,6 +151,11 @@ pub struct Told {
 }
 
 impl Detail {
+    /// Whether it is the exact surface that is drawn, on the processor.
+    pub fn is_default(&self) -> bool {
+        self.lod.is_none() && !self.gpu
+    }
+
     /// What lets ROAM go on from picture to picture over a land, if that is what is wanted and the land is not too large.
     pub fn prepare(&self, land: &Land) -> Option<NestedBounds> {
         if self.lod != Some(Method::Roam) {
@@ -123,7 +180,6 @@ impl Detail {
             water: None,
             water_drawing: Drawing::default(),
             shows_water: false,
-            painter: None,
         })
     }
 
@@ -162,17 +218,12 @@ impl Chooser<'_> {
     pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Told, Failure> {
         let view = View { tolerance_pixels: self.detail.tolerance as f32, ..*view };
         let started = Instant::now();
-        let mut told = match (&mut self.flight, &mut self.painter) {
-            (Some(flight), _) => {
+        let mut told = match &mut self.flight {
+            Some(flight) => {
                 let reached = flight.update(&view, &mut || false).map_err(refused)?;
                 Told::of(reached, flight.mesh().triangles.len(), started)
             }
-            // What can look at all patches at once does it itself.
-            (None, Some(painter)) if self.detail.lod == Some(Method::Patches) => {
-                let chosen = painter.tessellate(self.land, self.limits, &view).map_err(unpainted)?;
-                Told::of(chosen.reached, chosen.triangles as usize, started)
-            }
-            _ => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
+            None => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
         };
         // The graphics card has triangles of its own for the sea.
         let sea = sea.filter(|_| !self.detail.gpu);
@@ -194,41 +245,27 @@ impl Chooser<'_> {
         Ok(told)
     }
 
-    /// Draws on the graphics card from now on.
-    pub fn paint_with(&mut self, painter: Option<Painter>) {
-        self.painter = painter;
+    fn is_patches(&self) -> bool {
+        self.detail.lod == Some(Method::Patches)
     }
 
-    /// The picture of what was chosen last.
-    pub fn picture(
-        &mut self,
-        stage: &Stage,
-        sea: Option<&Sea>,
-        view: &View,
-        settings: &Settings,
-        told: &(dyn Fn(f32) + Sync),
-    ) -> Result<Picture, Failure> {
-        let Some(mut painter) = self.painter.take() else {
-            return Ok(stage.render_meshes(&self.meshes(), sea, view, settings, told));
-        };
-        if let Some(sea) = sea {
-            painter.follow_waves(sea);
-        }
-        let told = |done| told(done);
-        let painted = if self.detail.lod == Some(Method::Patches) {
-            painter.picture_of_patches(stage, view, settings.samples, &told)
-        } else {
-            let ground = self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh);
-            painter.picture(stage, ground, view, settings.samples, &told)
-        };
-        self.painter = Some(painter);
-        painted.map_err(unpainted)
+    /// Lets the graphics card choose the ground for a view.
+    fn tessellate(&self, painter: &mut Painter, view: &View) -> Result<Told, Failure> {
+        let view = View { tolerance_pixels: self.detail.tolerance as f32, ..*view };
+        let started = Instant::now();
+        let chosen = painter.tessellate(self.land, self.limits, &view).map_err(unpainted)?;
+        Ok(Told::of(chosen.reached, chosen.triangles as usize, started))
+    }
+
+    /// The mesh of the ground that was chosen last.
+    fn ground(&self) -> &Mesh {
+        self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)
     }
 
     /// What was chosen last.
     fn meshes(&self) -> Meshes<'_> {
         Meshes {
-            ground: Some(self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)),
+            ground: Some(self.ground()),
             water: self.shows_water.then_some(&self.water_drawing.mesh),
             wireframe: self.detail.wireframe,
         }

@@ -1,6 +1,6 @@
 //! Films: a path, and a picture for each moment of it.
 
-use crate::detail::{Chooser, Told};
+use crate::detail::{Drawer, Told};
 use crate::ground::System;
 use crate::subject::Subject;
 use crate::talk::{Failure, Talk, progress, seconds as shown_seconds, tidy};
@@ -80,7 +80,7 @@ impl Order<'_> {
         subject: &Subject,
         stage: &Stage<'_>,
         mut sea: Option<&mut Sea>,
-        mut chooser: Option<Chooser<'_>>,
+        mut drawer: Drawer<'_>,
         settings: &Settings,
         started: Instant,
         talk: &mut Talk,
@@ -121,14 +121,10 @@ impl Order<'_> {
                     sea.set_time(begin + time);
                 }
                 let (sea, view) = (sea.as_deref(), view(time, self.size));
-                let picture = match &mut chooser {
-                    Some(chooser) => {
-                        let told = chooser.choose(sea.filter(|_| stage.shows_waves()), &view)?;
-                        mesh.get_or_insert(Told { select_seconds: 0.0, ..told }).join(told);
-                        chooser.picture(stage, sea, &view, settings, &|_| {})?
-                    }
-                    None => stage.render_sea(sea, &view, settings, &|_| {}),
-                };
+                if let Some(told) = drawer.choose(sea.filter(|_| stage.shows_waves()), &view)? {
+                    mesh.get_or_insert(Told { select_seconds: 0.0, ..told }).join(told);
+                }
+                let picture = drawer.picture(stage, sea, &view, settings, &|_| {})?;
                 let pixels = picture.display(&display);
                 match &mut sink {
                     Sink::Film(film) => film.frame(&pixels)?,

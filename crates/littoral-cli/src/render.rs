@@ -1,6 +1,6 @@
 //! `littoral render`: pictures and films.
 
-use crate::detail::{Detail, Method, Told};
+use crate::detail::{Detail, Drawer, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
@@ -36,7 +36,7 @@ use std::time::Instant;
   littoral render --sea beaufort=8,from=240                the coast in a storm
   littoral render --sea buoy=41010.data_spec               in the waves that a buoy measured
   littoral render dem.tif --lod quadtree --tolerance 2 --wireframe      the mesh that a method of detail draws
-  littoral render --gpu                                    drawn by the graphics card
+  littoral render --gpu                                    drawn by the graphics card, the same exact surface
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
   littoral render dem.tif --path round.toml --seconds 30 --fps 25 --out flight.mp4
@@ -228,26 +228,19 @@ impl Render {
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
         if let Some(film) = film {
             let prepared = self.detail.prepare(stage.land());
-            let mut chooser = self.detail.chooser(stage.land(), prepared.as_ref());
-            if let Some(chooser) = &mut chooser {
-                chooser.paint_with(self.detail.painter(&stage, sea.as_ref(), talk)?);
-            }
-            return film.run(&subject, &stage, sea.as_mut(), chooser, &settings, started, talk);
+            let chooser = self.detail.chooser(stage.land(), prepared.as_ref());
+            let drawer = Drawer { chooser, painter: self.detail.painter(&stage, sea.as_ref(), talk)? };
+            return film.run(&subject, &stage, sea.as_mut(), drawer, &settings, started, talk);
         }
 
         let mesh_view = self.detail.view(&self, &subject, &shot.view, look, talk)?;
         let waves = sea.as_ref().filter(|_| stage.shows_waves());
-        let mut chooser = self.detail.chooser(stage.land(), None);
-        if let Some(chooser) = &mut chooser {
-            chooser.paint_with(self.detail.painter(&stage, sea.as_ref(), talk)?);
-        }
-        let chosen = chooser.as_mut().map(|chooser| chooser.choose(waves, &mesh_view)).transpose()?;
+        let painter = self.detail.painter(&stage, sea.as_ref(), talk)?;
+        let mut drawer = Drawer { chooser: self.detail.chooser(stage.land(), None), painter };
+        let chosen = drawer.choose(waves, &mesh_view)?;
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
-        let picture = match &mut chooser {
-            Some(chooser) => chooser.picture(&stage, sea.as_ref(), &shot.view, &settings, &told)?,
-            None => stage.render_sea(sea.as_ref(), &shot.view, &settings, &told),
-        };
+        let picture = drawer.picture(&stage, sea.as_ref(), &shot.view, &settings, &told)?;
         bar.finish_and_clear();
         let passes = self.save(&picture, &out, &subject)?;
 
@@ -321,7 +314,7 @@ impl Render {
                 shot.style,
                 self.water,
                 self.time,
-                self.detail.lod.map_or(String::new(), |_| format!(" {:?}", self.detail))
+                if self.detail.is_default() { String::new() } else { format!(" {:?}", self.detail) }
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,
@@ -338,9 +331,6 @@ impl Render {
         {
             self.files.push(path.clone());
             self.path = Some("orbit".into());
-        }
-        if self.detail.gpu {
-            self.detail.lod.get_or_insert(Method::Patches);
         }
         match (self.style, &self.texture) {
             (Some(StyleName::Image), None) => {

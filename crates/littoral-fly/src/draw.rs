@@ -7,7 +7,7 @@ use glam::UVec2;
 use littoral::field::HeightField;
 use littoral::picture::Stage;
 use littoral::space::{Datum, View};
-use littoral_gpu::{Gpu, Look, Triangles};
+use littoral_gpu::{Gpu, Ground, Look, Triangles};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A land and its light, ready to be drawn.
@@ -94,7 +94,7 @@ impl Renderer {
         let view = view((size / coarse).max(UVec2::ONE));
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let locked = full.lock().unwrap_or_else(PoisonError::into_inner);
-        self.full.draw(gpu, &mut encoder, &locked, &self.ground, &view, Look::default());
+        self.full.draw(gpu, &mut encoder, &locked, Ground::Triangles(&self.ground), &view, Look::default());
         match surface {
             true => self.full.show(gpu, &mut encoder, &locked, grey, target, size),
             false => clear(&mut encoder, target, [0.82, 0.84, 0.86]),

@@ -5,7 +5,7 @@ use littoral::field::{HeightField, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Patches};
 use littoral::picture::{Display, Exposure, Scene, Settings, Stage, coast_shot};
 use littoral::space::Datum;
-use littoral_gpu::{Gpu, Look, Renderer, Scenery, Triangles};
+use littoral_gpu::{Gpu, Ground, Look, Renderer, Scenery, Triangles};
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -39,7 +39,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let begin = Instant::now();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let offset = Vec2::new((number % 4) as f32 + 0.5, (number / 4) as f32 + 0.5) / 4.0 - 0.5;
-        renderer.draw(&gpu, &mut encoder, &scenery, &ground, &view, Look { offset, number: number + 1 });
+        renderer.draw(
+            &gpu,
+            &mut encoder,
+            &scenery,
+            Ground::Triangles(&ground),
+            &view,
+            Look { offset, number: number + 1 },
+        );
         gpu.queue.submit([encoder.finish()]);
         for (sum, seen) in sum.iter_mut().zip(renderer.read(&gpu)?) {
             (0..4).for_each(|i| sum[i] += seen[i] / looks as f32);

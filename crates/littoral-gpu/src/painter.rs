@@ -2,7 +2,8 @@
 
 use crate::device::{Gpu, GpuError};
 use crate::frame::Look;
-use crate::renderer::Renderer;
+use crate::rays::{ShapeError, ShapeTexture};
+use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
 use crate::tessellator::{Tessellated, Tessellator};
 use crate::triangles::{TooMany, Triangles};
@@ -19,11 +20,20 @@ pub struct Painter {
     gpu: Gpu,
     renderer: Renderer,
     scenery: Scenery,
-    ground: Triangles,
-    /// The ground instead, and the limits that were asked for.
+    triangles: Triangles,
+    shape: Option<ShapeTexture>,
+    /// What was tessellated last, and the limits that were asked for.
     patches: Option<(Limits, Tessellator)>,
     white: [f32; 3],
     medium: Medium,
+}
+
+/// Where the ground of a picture comes from.
+enum Source<'a> {
+    Mesh(&'a Mesh),
+    /// What was tessellated last.
+    Patches,
+    Rays,
 }
 
 /// Why a stage cannot be painted.
@@ -41,6 +51,9 @@ pub enum PainterError {
     /// Too many triangles.
     #[error(transparent)]
     TooMany(#[from] TooMany),
+    /// Too many samples for rays.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
     /// A picture larger than the device's textures.
     #[error(
         "expected a picture of at most {most} pixels a side, which is what this graphics adapter draws, got {got}; draw it smaller, or on the processor"
@@ -84,7 +97,8 @@ impl Painter {
             gpu,
             renderer,
             scenery,
-            ground: Triangles::default(),
+            triangles: Triangles::default(),
+            shape: None,
             patches: None,
             white: tables.white,
             medium: tables.medium,
@@ -110,25 +124,23 @@ impl Painter {
         &self.gpu
     }
 
-    /// What a view sees of the stage whose ground is this mesh, looking through each pixel so many times. `progress` is told the fraction done.
+    /// What a view sees of the stage whose ground is this mesh, or is met by rays, looking through each pixel so many times. `progress` is told the fraction done.
     ///
     /// # Errors
-    /// If the picture or the mesh is larger than the device's textures or buffers, or the device was lost.
+    /// If the picture, the mesh or what rays need is larger than the device's textures or buffers, or the device was lost.
     pub fn picture(
         &mut self,
         stage: &Stage,
-        ground: &Mesh,
+        ground: Option<&Mesh>,
         view: &View,
         looks: u32,
         progress: &dyn Fn(f32),
     ) -> Result<Picture, PainterError> {
-        self.patches = None;
-        self.ground.set(&self.gpu, ground)?;
-        self.paint(stage, view, looks, progress)
+        self.paint(stage, ground.map_or(Source::Rays, Source::Mesh), view, looks, progress)
     }
 
-    /// Tessellates a land, that of the stage, on the device for the view that is given, which need not be the picture's: see [`Tessellator`]. The first time, and after
-    /// [`Painter::picture`], the land is brought to the device.
+    /// Tessellates a land, that of the stage, on the device for the view that is given, which need not be the picture's: see [`Tessellator`]. The first time, and when
+    /// limits change, the land is brought to the device.
     ///
     /// # Errors
     /// If the land is larger than the device's textures, the view is not one that a picture can be drawn of, or the device was lost.
@@ -155,12 +167,13 @@ impl Painter {
         looks: u32,
         progress: &dyn Fn(f32),
     ) -> Result<Picture, PainterError> {
-        self.paint(stage, view, looks, progress)
+        self.paint(stage, Source::Patches, view, looks, progress)
     }
 
     fn paint(
         &mut self,
         stage: &Stage,
+        source: Source,
         view: &View,
         looks: u32,
         progress: &dyn Fn(f32),
@@ -173,7 +186,22 @@ impl Painter {
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
-        let ground = self.patches.as_ref().map_or(&self.ground, |(_, patches)| patches.triangles());
+        let ground = match source {
+            Source::Mesh(mesh) => {
+                self.triangles.set(gpu, mesh)?;
+                Ground::Triangles(&self.triangles)
+            }
+            Source::Patches => {
+                Ground::Triangles(self.patches.as_ref().map_or(&self.triangles, |(_, patches)| patches.triangles()))
+            }
+            Source::Rays => {
+                let shape = match self.shape.take() {
+                    Some(shape) => shape,
+                    None => ShapeTexture::new(gpu, stage.land())?,
+                };
+                Ground::Rays { shape: self.shape.insert(shape), pixels: 0.0 }
+            }
+        };
         let looks = looks.max(1);
         let share = 1.0 / looks as f32;
         let mut picture = Picture::empty(view.size, view.eye);

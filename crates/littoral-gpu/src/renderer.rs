@@ -2,7 +2,9 @@
 
 use crate::device::{Gpu, GpuError};
 use crate::frame::{Look, Uniforms};
+use crate::rays::ShapeTexture;
 use crate::scenery::Scenery;
+use crate::times::PassTimes;
 use crate::triangles::Triangles;
 use crate::waves::{WavePass, Wet};
 use glam::UVec2;
@@ -30,9 +32,23 @@ pub const SHADERS: [(&str, &str); 4] = [
     ("wires", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/wires.wgsl"))),
 ];
 
-const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Radiance (kcd/m²), and the distance of what is seen (m), 0 for the sky.
 const RADIANCE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// What tells how far away the ground is.
+#[derive(Clone, Copy, Debug)]
+pub enum Ground<'a> {
+    /// A mesh of it.
+    Triangles(&'a Triangles),
+    /// A ray through each pixel.
+    Rays {
+        /// What they meet.
+        shape: &'a ShapeTexture,
+        /// 0 for exact hits; otherwise squares of ground that are not wider than so many pixels are drawn as high as their highest point.
+        pixels: f32,
+    },
+}
 
 /// What a picture is drawn into before it is shown.
 #[derive(Debug)]
@@ -57,6 +73,8 @@ pub struct Renderer {
     uniforms: wgpu::Buffer,
     shown: wgpu::Buffer,
     canvas: Option<Canvas>,
+    /// Where pictures leave how long their passes took.
+    pub times: Option<PassTimes>,
     /// Made when the first waves are drawn.
     waves: Option<WavePass>,
 }
@@ -178,6 +196,7 @@ impl Renderer {
             uniforms: uniform("frame", size_of::<Uniforms>() as u64),
             shown: uniform("shown", 32),
             canvas: None,
+            times: None,
             waves: None,
         }
     }
@@ -205,19 +224,19 @@ impl Renderer {
         }))
     }
 
-    /// Records the passes that find what a view sees of a scenery with these triangles of its ground, and its light.
-    pub fn draw(
+    /// Records the first pass of a picture alone: how far away the ground is.
+    pub fn distances(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         scenery: &Scenery,
-        ground: &Triangles,
+        ground: Ground<'_>,
         view: &View,
         look: Look,
     ) {
         gpu.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&Uniforms::new(scenery, view, look)));
         self.canvas(gpu, view.size);
-        let Some(canvas) = &mut self.canvas else { return };
+        let Some(canvas) = &self.canvas else { return };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surface"),
             color_attachments: &[],
@@ -226,24 +245,27 @@ impl Renderer {
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             }),
+            timestamp_writes: self.times.as_ref().and_then(|times| times.of("surface")),
             ..Default::default()
         });
-        if let (Some(vertices), Some(corners), false) = (&ground.vertices, &ground.corners, ground.is_empty()) {
-            pass.set_pipeline(&self.surface);
-            let frame = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("frame"),
-                layout: &self.surface.get_bind_group_layout(0),
-                entries: &[wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() }],
-            });
-            pass.set_bind_group(0, &frame, &[]);
-            pass.set_vertex_buffer(0, vertices.slice(..));
-            pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
-            match &ground.drawn {
-                Some(drawn) => pass.draw_indexed_indirect(drawn, 0),
-                None => pass.draw_indexed(0..ground.count, 0, 0..1),
-            }
+        match ground {
+            Ground::Triangles(triangles) => self.surface(gpu, &mut pass, triangles),
+            Ground::Rays { shape, pixels } => shape.cast(gpu, &mut pass, &self.uniforms, view, pixels),
         }
-        drop(pass);
+    }
+
+    /// Records the passes that find what a view sees of a scenery with this ground, and its light.
+    pub fn draw(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        scenery: &Scenery,
+        ground: Ground<'_>,
+        view: &View,
+        look: Look,
+    ) {
+        self.distances(gpu, encoder, scenery, ground, view, look);
+        let Some(canvas) = &mut self.canvas else { return };
         if let Some(waves) = &scenery.waves {
             let size = view.size.max(UVec2::ONE);
             if (canvas.wet.depth.width(), canvas.wet.depth.height()) != (size.x, size.y) {
@@ -290,11 +312,32 @@ impl Renderer {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shade"),
             color_attachments: &[Some(onto(&radiance, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
+            timestamp_writes: self.times.as_ref().and_then(|times| times.of("shade")),
             ..Default::default()
         });
         pass.set_pipeline(&self.shade);
         pass.set_bind_group(0, &everything, &[]);
         pass.draw(0..3, 0..1);
+    }
+
+    /// Records triangles, as far away as they are.
+    fn surface(&self, gpu: &Gpu, pass: &mut wgpu::RenderPass<'_>, ground: &Triangles) {
+        let (Some(vertices), Some(corners), false) = (&ground.vertices, &ground.corners, ground.is_empty()) else {
+            return;
+        };
+        pass.set_pipeline(&self.surface);
+        let frame = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("frame"),
+            layout: &self.surface.get_bind_group_layout(0),
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() }],
+        });
+        pass.set_bind_group(0, &frame, &[]);
+        pass.set_vertex_buffer(0, vertices.slice(..));
+        pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
+        match &ground.drawn {
+            Some(drawn) => pass.draw_indexed_indirect(drawn, 0),
+            None => pass.draw_indexed(0..ground.count, 0, 0..1),
+        }
     }
 
     /// Records the pass that draws the edges of triangles over what was shown: onto a target of the size that was drawn. What lies behind the ground is hidden. Of

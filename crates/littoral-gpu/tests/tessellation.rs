@@ -221,7 +221,7 @@ fn a_picture_of_patches_is_that_of_their_mesh() {
     assert_eq!(told.triangles as usize, drawing.mesh.triangles.len());
     assert!((told.reached.pixels - reached.pixels).abs() < 1e-3 * reached.pixels, "{told:?} for {reached:?}");
     let patches = painter.picture_of_patches(&stage, &shot.view, 1, &|_| {}).expect("a picture");
-    let mesh = painter.picture(&stage, &drawing.mesh, &shot.view, 1, &|_| {}).expect("a picture");
+    let mesh = painter.picture(&stage, Some(&drawing.mesh), &shot.view, 1, &|_| {}).expect("a picture");
     assert_eq!(patches.radiance, mesh.radiance);
     assert_eq!(patches.depth, mesh.depth);
     assert!(mesh.depth.iter().filter(|depth| **depth > 0.0).count() > 2000, "hardly any ground");
