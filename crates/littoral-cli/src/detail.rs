@@ -47,6 +47,7 @@ fn methods() -> impl TypedValueParser<Value = Method> {
 pub struct Chooser<'a> {
     detail: &'a Detail,
     land: &'a Land,
+    limits: Limits,
     ground: Box<dyn Lod>,
     /// ROAM over prepared land, which goes on from picture to picture.
     flight: Option<RoamFlight<'a>>,
@@ -67,7 +68,13 @@ pub struct Drawer<'a> {
 impl Drawer<'_> {
     /// Chooses the meshes for a view, if such are drawn.
     pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Option<Told>, Failure> {
-        self.chooser.as_mut().map(|chooser| chooser.choose(sea, view)).transpose()
+        let Some(chooser) = &mut self.chooser else { return Ok(None) };
+        match &mut self.painter {
+            // What can look at all patches at once does it itself.
+            Some(painter) if chooser.is_patches() => chooser.tessellate(painter, view),
+            _ => chooser.choose(sea, view),
+        }
+        .map(Some)
     }
 
     /// The picture, of what was chosen last if meshes are drawn.
@@ -79,13 +86,21 @@ impl Drawer<'_> {
         settings: &Settings,
         told: &(dyn Fn(f32) + Sync),
     ) -> Result<Picture, Failure> {
-        let ground = self.chooser.as_ref().map(Chooser::ground);
         if let Some(painter) = &mut self.painter {
             if let Some(sea) = sea {
                 painter.follow_waves(sea);
             }
-            let painted = painter.picture(stage, ground, view, settings.samples, &|done| told(done));
-            return painted.map_err(|e| Failure::Work(format!("--gpu: {e}")));
+            let told = |done| told(done);
+            let painted = match &self.chooser {
+                Some(chooser) if chooser.is_patches() => {
+                    painter.picture_of_patches(stage, view, settings.samples, &told)
+                }
+                chooser => {
+                    let ground = chooser.as_ref().map(Chooser::ground);
+                    painter.picture(stage, ground, view, settings.samples, &told)
+                }
+            };
+            return painted.map_err(unpainted);
         }
         Ok(match &self.chooser {
             Some(chooser) => stage.render_meshes(&chooser.meshes(), sea, view, settings, told),
@@ -130,6 +145,7 @@ impl Detail {
         Some(Chooser {
             detail: self,
             land,
+            limits,
             ground: self.lod?.within(limits),
             flight: prepared.map(|bounds| RoamFlight::over(bounds, limits)),
             ground_drawing: Drawing::default(),
@@ -144,13 +160,12 @@ impl Detail {
         if !self.gpu {
             return Ok(None);
         }
-        let failed = |e: PainterError| Failure::Work(format!("--gpu: {e}"));
-        let gpu = Gpu::headless().map_err(|e| failed(e.into()))?;
+        let gpu = Gpu::headless().map_err(|e| unpainted(e.into()))?;
         if gpu.is_software() {
             talk.note(format!("no graphics card: {} stands for one", gpu.adapter.name));
         }
-        let mut painter = Painter::new(gpu, stage).map_err(failed)?;
-        painter.set_waves(sea).map_err(failed)?;
+        let mut painter = Painter::new(gpu, stage).map_err(unpainted)?;
+        painter.set_waves(sea).map_err(unpainted)?;
         Ok(Some(painter))
     }
 
@@ -178,7 +193,7 @@ impl Chooser<'_> {
         let mut told = match &mut self.flight {
             Some(flight) => {
                 let reached = flight.update(&view, &mut || false).map_err(refused)?;
-                Told::of(reached, flight.mesh(), started)
+                Told::of(reached, flight.mesh().triangles.len(), started)
             }
             None => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
         };
@@ -202,6 +217,18 @@ impl Chooser<'_> {
         Ok(told)
     }
 
+    fn is_patches(&self) -> bool {
+        self.detail.lod == Some(Method::Patches)
+    }
+
+    /// Lets the graphics card choose the ground for a view.
+    fn tessellate(&self, painter: &mut Painter, view: &View) -> Result<Told, Failure> {
+        let view = View { tolerance_pixels: self.detail.tolerance as f32, ..*view };
+        let started = Instant::now();
+        let chosen = painter.tessellate(self.land, self.limits, &view).map_err(unpainted)?;
+        Ok(Told::of(chosen.reached, chosen.triangles as usize, started))
+    }
+
     /// The mesh of the ground that was chosen last.
     fn ground(&self) -> &Mesh {
         self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)
@@ -217,6 +244,10 @@ impl Chooser<'_> {
     }
 }
 
+fn unpainted(error: PainterError) -> Failure {
+    Failure::Work(format!("--gpu: {error}"))
+}
+
 fn refused(error: ViewError) -> Failure {
     Failure::Work(format!("--lod: {error}"))
 }
@@ -225,16 +256,16 @@ fn refused(error: ViewError) -> Failure {
 fn choose(lod: &mut dyn Lod, field: &dyn HeightField, view: &View, drawing: &mut Drawing) -> Result<Told, Failure> {
     let started = Instant::now();
     let reached = lod.select(field, view, drawing).map_err(refused)?;
-    let mut told = Told::of(reached, &drawing.mesh, started);
+    let mut told = Told::of(reached, 0, started);
     drawing.expand(field);
     told.triangles = drawing.mesh.triangles.len();
     Ok(told)
 }
 
 impl Told {
-    fn of(reached: Reached, mesh: &Mesh, started: Instant) -> Told {
+    fn of(reached: Reached, triangles: usize, started: Instant) -> Told {
         Told {
-            triangles: mesh.triangles.len(),
+            triangles,
             bound_pixels: reached.pixels,
             limited: reached.limited,
             select_seconds: started.elapsed().as_secs_f64(),

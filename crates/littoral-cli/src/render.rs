@@ -236,9 +236,9 @@ impl Render {
 
         let mesh_view = self.detail.view(&self, &subject, &shot.view, look, talk)?;
         let waves = sea.as_ref().filter(|_| stage.shows_waves());
-        let mut drawer = Drawer { chooser: self.detail.chooser(stage.land(), None), painter: None };
+        let painter = self.detail.painter(&stage, sea.as_ref(), talk)?;
+        let mut drawer = Drawer { chooser: self.detail.chooser(stage.land(), None), painter };
         let chosen = drawer.choose(waves, &mesh_view)?;
-        drawer.painter = self.detail.painter(&stage, sea.as_ref(), talk)?;
         let bar = progress(1000, "rendering");
         let told = |done: f32| bar.set_position((f64::from(done) * 1000.0) as u64);
         let picture = drawer.picture(&stage, sea.as_ref(), &shot.view, &settings, &told)?;

@@ -5,11 +5,12 @@ use crate::frame::Look;
 use crate::rays::{ShapeError, ShapeTexture};
 use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
+use crate::tessellator::{Tessellated, Tessellator};
 use crate::triangles::{TooMany, Triangles};
 use crate::waves::WavesError;
 use glam::{UVec2, Vec2};
-use littoral::field::{HeightField, Sea};
-use littoral::lod::Mesh;
+use littoral::field::{HeightField, Land, Sea};
+use littoral::lod::{Limits, Mesh, ViewError};
 use littoral::picture::{Medium, Picture, Stage};
 use littoral::space::{Datum, View};
 
@@ -21,8 +22,18 @@ pub struct Painter {
     scenery: Scenery,
     triangles: Triangles,
     shape: Option<ShapeTexture>,
+    /// What was tessellated last, and the limits that were asked for.
+    patches: Option<(Limits, Tessellator)>,
     white: [f32; 3],
     medium: Medium,
+}
+
+/// Where the ground of a picture comes from.
+enum Source<'a> {
+    Mesh(&'a Mesh),
+    /// What was tessellated last.
+    Patches,
+    Rays,
 }
 
 /// Why a stage cannot be painted.
@@ -34,6 +45,9 @@ pub enum PainterError {
     /// Too many samples.
     #[error(transparent)]
     TooLarge(#[from] TooLarge),
+    /// A view of which there is no picture.
+    #[error(transparent)]
+    View(#[from] ViewError),
     /// Too many triangles.
     #[error(transparent)]
     TooMany(#[from] TooMany),
@@ -79,8 +93,16 @@ impl Painter {
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
         gpu.check()?;
-        let (triangles, shape) = (Triangles::default(), None);
-        Ok(Painter { gpu, renderer, scenery, triangles, shape, white: tables.white, medium: tables.medium })
+        Ok(Painter {
+            gpu,
+            renderer,
+            scenery,
+            triangles: Triangles::default(),
+            shape: None,
+            patches: None,
+            white: tables.white,
+            medium: tables.medium,
+        })
     }
 
     /// Draws the waves of a sea where it stands, from here on; or still water.
@@ -114,6 +136,48 @@ impl Painter {
         looks: u32,
         progress: &dyn Fn(f32),
     ) -> Result<Picture, PainterError> {
+        self.paint(stage, ground.map_or(Source::Rays, Source::Mesh), view, looks, progress)
+    }
+
+    /// Tessellates a land, that of the stage, on the device for the view that is given, which need not be the picture's: see [`Tessellator`]. The first time, and when
+    /// limits change, the land is brought to the device.
+    ///
+    /// # Errors
+    /// If the land is larger than the device's textures, the view is not one that a picture can be drawn of, or the device was lost.
+    pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
+        let patches = match self.patches.take() {
+            Some(patches) if patches.0 == limits => patches,
+            _ => (limits, Tessellator::new(&self.gpu, land, limits)?),
+        };
+        let (_, patches) = self.patches.insert(patches);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        patches.tessellate(&self.gpu, &mut encoder, view, None)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        Ok(patches.read(&self.gpu)?)
+    }
+
+    /// The same as [`Painter::picture`], the ground being what was tessellated last.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn picture_of_patches(
+        &mut self,
+        stage: &Stage,
+        view: &View,
+        looks: u32,
+        progress: &dyn Fn(f32),
+    ) -> Result<Picture, PainterError> {
+        self.paint(stage, Source::Patches, view, looks, progress)
+    }
+
+    fn paint(
+        &mut self,
+        stage: &Stage,
+        source: Source,
+        view: &View,
+        looks: u32,
+        progress: &dyn Fn(f32),
+    ) -> Result<Picture, PainterError> {
         let gpu = &self.gpu;
         let most = gpu.device.limits().max_texture_dimension_2d;
         if view.size.max_element() > most {
@@ -122,12 +186,15 @@ impl Painter {
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
-        let ground = match ground {
-            Some(mesh) => {
+        let ground = match source {
+            Source::Mesh(mesh) => {
                 self.triangles.set(gpu, mesh)?;
                 Ground::Triangles(&self.triangles)
             }
-            None => {
+            Source::Patches => {
+                Ground::Triangles(self.patches.as_ref().map_or(&self.triangles, |(_, patches)| patches.triangles()))
+            }
+            Source::Rays => {
                 let shape = match self.shape.take() {
                     Some(shape) => shape,
                     None => ShapeTexture::new(gpu, stage.land())?,

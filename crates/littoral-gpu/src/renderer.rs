@@ -332,7 +332,10 @@ impl Renderer {
         pass.set_bind_group(0, &frame, &[]);
         pass.set_vertex_buffer(0, vertices.slice(..));
         pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..ground.count, 0, 0..1);
+        match &ground.drawn {
+            Some(drawn) => pass.draw_indexed_indirect(drawn, 0),
+            None => pass.draw_indexed(0..ground.count, 0, 0..1),
+        }
     }
 
     /// Records the pass that draws the edges of triangles over what was shown: onto a target of the size that was drawn. What lies behind the ground is hidden. Of
@@ -372,7 +375,10 @@ impl Renderer {
         });
         pass.set_pipeline(&self.wires);
         pass.set_bind_group(0, &bound, &[]);
-        pass.draw(0..triangles.count, 0..1);
+        match &triangles.drawn {
+            Some(drawn) => pass.draw_indirect(drawn, 0),
+            None => pass.draw(0..triangles.count, 0..1),
+        }
     }
 
     /// Records the pass that shows what was drawn last on a target of some size (pixels), the drawn picture stretched over all of it. `grey` is the radiance (kcd/m²) that is shown

@@ -8,8 +8,10 @@ use littoral::lod::Mesh;
 pub struct Triangles {
     pub(crate) vertices: Option<wgpu::Buffer>,
     pub(crate) corners: Option<wgpu::Buffer>,
-    /// Three times the triangles.
+    /// Three times the triangles, or the most there may be.
     pub(crate) count: u32,
+    /// What an indexed draw is told, where only the device knows how many there are; its first four numbers tell the same to a draw without indices.
+    pub(crate) drawn: Option<wgpu::Buffer>,
 }
 
 impl Triangles {
@@ -26,11 +28,11 @@ impl Triangles {
         }
         fill(gpu, &mut self.vertices, "vertices", VERTICES, bytemuck::cast_slice(&mesh.vertices));
         fill(gpu, &mut self.corners, "triangles", CORNERS, bytemuck::cast_slice(&mesh.triangles));
-        self.count = 3 * triangles as u32;
+        (self.count, self.drawn) = (3 * triangles as u32, None);
         Ok(())
     }
 
-    /// How many triangles there are.
+    /// How many triangles there are; how many there may be at most, if the device made them.
     pub fn len(&self) -> usize {
         self.count as usize / 3
     }

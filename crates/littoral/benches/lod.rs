@@ -4,6 +4,7 @@
 //! * *Patches*, 2016: a globe's relief in 16 384 × 8 192 samples (`LITTORAL_GLOBE=1`; two gigabytes), 1920 × 1080 pixels.
 
 mod clock;
+mod globe;
 
 use clock::{median, processor_time};
 use glam::{DVec2, DVec3, UVec2, Vec3};
@@ -18,40 +19,17 @@ use std::hint::black_box;
 fn main() {
     nested();
     if std::env::var_os("LITTORAL_GLOBE").is_some() {
-        globe();
+        on_a_globe();
     } else {
         everyone();
     }
 }
 
-/// The set-up of 2016 on a plane: relief as large and rough as a globe's, from 300 km up, six levels between the coarsest patches and the finest.
-fn globe() {
-    const COLUMNS: usize = 16_384;
-    const ROWS: usize = 8_192;
-    const STEP: f64 = 2_446.0;
-    // Continents, and mountains that repeat every 1024 samples: what counts is how rough it is.
-    let (continents, mountains) = (Fbm::new(8e6, 3000.0, 5, 1), Fbm::new(4e5, 900.0, 7, 2));
-    let tile = |side: usize, step: f64, noise: &Fbm| -> Vec<f32> {
-        let at = |i: usize| DVec2::new((i % side) as f64, (i / side) as f64) * step;
-        (0..side * side).map(|i| noise.at(at(i)).value as f32).collect()
-    };
-    let (coarse, fine) = (tile(1025, 16.0 * STEP, &continents), tile(1024, STEP, &mountains));
-    let mut heights = Vec::with_capacity(COLUMNS * ROWS);
-    for j in 0..ROWS {
-        for i in 0..COLUMNS {
-            let (x, y) = (i / 16, j / 16);
-            let (u, v) = ((i % 16) as f32 / 16.0, (j % 16) as f32 / 16.0);
-            let at = |x: usize, y: usize| coarse[y * 1025 + x];
-            let south = at(x, y) + (at(x + 1, y) - at(x, y)) * u;
-            let north = at(x, y + 1) + (at(x + 1, y + 1) - at(x, y + 1)) * u;
-            heights.push(south + (north - south) * v + fine[(j % 1024) * 1024 + i % 1024]);
-        }
-    }
-    let land = Land::new(Raster::new(COLUMNS, ROWS, DVec2::splat(STEP), heights).expect("sizes are valid"));
-    let eye = DVec3::new(0.0, -3e5, 3e5);
+/// The set-up of 2016: six levels between the coarsest patches and the finest, and all of them.
+fn on_a_globe() {
+    let land = globe::land(globe::COLUMNS);
     for (finest, tolerance) in [(11, 1.0), (14, 1.0), (14, 0.5), (14, 0.25)] {
-        let view = View::looking_at(eye, DVec3::new(0.0, 8e5, 0.0), 50f32.to_radians(), UVec2::new(1920, 1080));
-        let view = View { tolerance_pixels: tolerance, ..view };
+        let view = globe::view(tolerance);
         let mut lod = Patches::new(Limits { finest, triangles: 4_000_000 });
         let mut drawing = Drawing::default();
         let mut pixels = 0.0;

@@ -147,6 +147,22 @@ impl RangePyramid {
         }
     }
 
+    /// All nodes of a level as steps, row by row from the south: lows and highs. A node whose low is above its high has no surface; n steps
+    /// stand for `base + n · step` of [`RangePyramid::scale`] (m).
+    ///
+    /// # Panics
+    /// If there is no such level.
+    pub fn steps(&self, level: u32) -> (&[u16], &[u16]) {
+        let Level { offset, columns, rows } = self.levels[level as usize - 1];
+        let nodes = offset..offset + columns * rows;
+        (&self.lows[nodes.clone()], &self.highs[nodes])
+    }
+
+    /// The height (m) that step 0 stands for, and that of one step (m).
+    pub fn scale(&self) -> (f32, f32) {
+        (self.base, self.step)
+    }
+
     /// The height (m) that a number of steps stands for.
     #[inline]
     pub(crate) fn height(&self, steps: u16) -> f32 {

@@ -129,7 +129,7 @@ impl ScreenMetric {
 
     /// Straight ahead, the frame's four sides (normals pointing inward), pixels a unit of tangent covers, and the greatest distance in the frame
     /// as a multiple of the depth: for who measures many boxes at once.
-    pub(super) fn lens(&self) -> (Vec3, [Vec3; 4], f32, f32) {
+    pub fn lens(&self) -> (Vec3, [Vec3; 4], f32, f32) {
         (self.forward, self.sides, self.focal, self.stretch)
     }
 
