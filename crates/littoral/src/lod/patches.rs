@@ -12,7 +12,7 @@
 //! them are cut: the lists hold cells, each measured once, which know those beside them.
 //!
 //! Where the limit of triangles binds, the tolerance that it leaves is found on the way: a histogram over tolerances counts what would be drawn at each of
-//! them, so that it is raised only as far as needed, and nothing is done twice.
+//! them, so that it is raised only as far as needed, and nothing is done twice. So it is where the lists would grow beyond two cells for each triangle allowed.
 //!
 //! Without geomorphs: a patch is whole or cut.
 
@@ -53,8 +53,8 @@ impl Lod for Patches {
             let (here, next) = self.levels.split_at_mut(last + 1);
             let here = &mut here[last];
             here.measure(field, &metric);
-            here.count(field, &mut self.census, last < usize::from(finest));
-            let Some(next) = next.first_mut() else { break };
+            let goes_on = here.count(field, &mut self.census, last < usize::from(finest));
+            let Some(next) = next.first_mut().filter(|_| goes_on) else { break };
             here.cut(self.census.tolerance(), next);
             if next.is_empty() {
                 break;
@@ -94,4 +94,47 @@ fn sliver(cell: Cell, side: usize) -> Patch {
     };
     let corner = [0, 1].map(|axis| patch.corner[axis].wrapping_add_signed(from[axis]));
     Patch { corner, across: by, up: by.map(|c| c / 2), ..patch }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::HeightRange;
+    use crate::space::{Datum, Place};
+    use glam::{DVec2, DVec3, UVec2};
+
+    /// A surface that is as wrong drawn finely as coarsely, like the bound of waves that may break.
+    struct Restless;
+
+    impl HeightField for Restless {
+        fn datum(&self) -> Datum {
+            Datum::Plane { origin: DVec2::splat(-4000.0), size: DVec2::splat(8000.0) }
+        }
+
+        fn height(&self, _: Place) -> Option<f32> {
+            Some(0.0)
+        }
+
+        fn range(&self, _: Cell) -> HeightRange {
+            HeightRange { low: -5.0, high: 5.0 }
+        }
+
+        fn error(&self, _: Cell) -> f32 {
+            10.0
+        }
+    }
+
+    #[test]
+    fn lists_stay_within_bounds_where_errors_do_not_fall() {
+        let view = View::looking_at(DVec3::new(0.0, -3000.0, 120.0), DVec3::ZERO, 0.8, UVec2::new(640, 360));
+        for triangles in [5_000, 40_000] {
+            let mut lod = Patches::new(Limits { finest: 20, triangles });
+            let mut drawing = Drawing::default();
+            let reached = lod.select(&Restless, &view, &mut drawing).expect("a view");
+            let cells: usize = lod.levels.iter().map(Level::len).sum();
+            assert!(cells <= 2 * triangles + 4096, "{cells} cells for {triangles} triangles");
+            assert!((triangles / 4..=triangles).contains(&drawing.patches.len()), "{} drawn", drawing.patches.len());
+            assert!(reached.limited && reached.pixels.is_finite());
+        }
+    }
 }

@@ -19,6 +19,8 @@ pub(super) struct Level {
     children: Vec<u32>,
     /// Sides over which a sliver stands unless the cell beyond is cut, too: a bit each.
     open: Vec<u8>,
+    /// Scratch: bounds in order.
+    order: Vec<u32>,
 }
 
 /// Not in the list.
@@ -76,6 +78,12 @@ impl Level {
         self.cells.is_empty()
     }
 
+    /// How many cells are looked at.
+    #[cfg(test)]
+    pub fn len(&self) -> usize {
+        self.cells.len()
+    }
+
     /// Looks at every cell.
     pub fn measure(&mut self, field: &dyn HeightField, metric: &ScreenMetric) {
         let look = |cell: &Cell, above: &f32| {
@@ -103,11 +111,12 @@ impl Level {
         }
     }
 
-    /// Tells the census what is drawn at which tolerance, and finds the sides over which slivers may stand.
-    pub fn count(&mut self, field: &dyn HeightField, census: &mut Census, may_be_cut: bool) {
+    /// Tells the census what is drawn at which tolerance, and finds the sides over which slivers may stand. Answers whether to go on to the next level.
+    pub fn count(&mut self, field: &dyn HeightField, census: &mut Census, may_be_cut: bool) -> bool {
         self.open.clear();
         self.open.resize(self.cells.len(), 0);
         let tolerance = census.tolerance();
+        let (may_be_cut, least) = if may_be_cut { self.fit(census) } else { (false, 0) };
         for (i, (look, above)) in self.looks.iter().zip(&self.above).enumerate() {
             if look.kind == Kind::Whole {
                 census.add(*above, 2);
@@ -140,7 +149,25 @@ impl Level {
                 }
             }
         }
-        census.settle();
+        census.settle(least);
+        may_be_cut
+    }
+
+    /// Whether cells may be cut, and above which bin if not all of them.
+    fn fit(&mut self, census: &mut Census) -> (bool, usize) {
+        let room = census.room(self.cells.len());
+        let tolerance = census.tolerance();
+        if self.looks.iter().filter(|look| look.pixels > tolerance).count() <= room {
+            return (true, 0);
+        }
+        // The bin of the first that finds no room, the largest bounds coming first.
+        self.order.clear();
+        self.order.extend(self.looks.iter().map(|look| look.pixels.to_bits()));
+        let (_, first, _) = self.order.select_nth_unstable_by(room, |a, b| b.cmp(a));
+        let least = (*first >> SHIFT) as usize;
+        // Where bounds hardly fall from level to level that would leave next to nothing: then this level is the last.
+        let cut = self.order.iter().filter(|&&bits| (bits >> SHIFT) as usize > least).count();
+        if census.enough(least, cut) { (true, least) } else { (false, 0) }
     }
 
     /// Puts the quarters of the cells that `tolerance` (pixels) asks to cut into the next level's list.
@@ -223,7 +250,15 @@ pub(super) struct Census {
     count: i64,
     /// For each bin of tolerances: how many more triangles there are below it than above.
     bins: Vec<i32>,
+    /// Cells that are looked at, and that may be.
+    cells: usize,
+    most_cells: usize,
 }
+
+/// Cells that are looked at for each triangle allowed, and some beside: usually there are 0.6 to 1.5. Of a surface whose bound hardly falls from level to level, such as that of
+/// waves that may break, there would be four times as many on each level.
+const CELLS_A_TRIANGLE: usize = 2;
+const CELLS_BESIDE: usize = 4096;
 
 /// Bits of a number that do not tell bins apart: 256 bins to an octave.
 const SHIFT: u32 = 15;
@@ -231,7 +266,9 @@ const SHIFT: u32 = 15;
 impl Census {
     /// Begins: a tolerance (pixels) that is kept unless it takes more than `most` triangles.
     pub fn start(&mut self, tolerance: f32, most: usize) {
-        *self = Census { tolerance, most: most as i64, count: 0, bins: std::mem::take(&mut self.bins) };
+        let most_cells = most.saturating_mul(CELLS_A_TRIANGLE).saturating_add(CELLS_BESIDE);
+        let bins = std::mem::take(&mut self.bins);
+        *self = Census { tolerance, most: most as i64, count: 0, bins, cells: 0, most_cells };
         self.bins.clear();
         self.bins.resize((f32::INFINITY.to_bits() >> SHIFT) as usize + 1, 0);
     }
@@ -246,20 +283,36 @@ impl Census {
         self.count += i64::from(triangles);
     }
 
-    /// Raises the tolerance until it takes no more triangles than allowed.
-    fn settle(&mut self) {
-        if self.count <= self.most {
+    /// So many more cells are looked at: how many of them may be cut for the lists to stay within bounds.
+    fn room(&mut self, cells: usize) -> usize {
+        self.cells += cells;
+        self.most_cells.saturating_sub(self.cells) / 4
+    }
+
+    /// Whether enough of the triangles allowed are left above a bin, if so many cells are cut into four.
+    fn enough(&self, least: usize, cut: usize) -> bool {
+        let kept: i64 = self.bins[least + 1..].iter().map(|&more| i64::from(more)).sum();
+        2 * (kept + 8 * cut as i64) >= self.most
+    }
+
+    /// Raises the tolerance until it takes no more triangles than allowed, and above a bin at least.
+    fn settle(&mut self, least: usize) {
+        let mut bin = 0;
+        if self.count > self.most {
+            // From the largest tolerance down.
+            let mut count = 0;
+            bin = self.bins.len() - 1;
+            while count + i64::from(self.bins[bin]) <= self.most && bin > 0 {
+                count += i64::from(self.bins[bin]);
+                bin -= 1;
+            }
+        } else if least == 0 {
             return;
         }
-        // From the largest tolerance down.
-        let (mut count, mut bin) = (0, self.bins.len() - 1);
-        while count + i64::from(self.bins[bin]) <= self.most && bin > 0 {
-            count += i64::from(self.bins[bin]);
-            bin -= 1;
-        }
+        let bin = bin.max(least);
         self.tolerance = self.tolerance.max(f32::from_bits((((bin + 1) << SHIFT) - 1) as u32));
-        self.count = count;
         // What is below the new tolerance is no more.
         self.bins[..=bin].fill(0);
+        self.count = self.bins[bin + 1..].iter().map(|&more| i64::from(more)).sum();
     }
 }
