@@ -9,9 +9,9 @@ use glam::{Mat4, UVec2, Vec2};
 use littoral::field::{HeightField, Sea};
 use littoral::picture::Stage;
 use littoral::space::{Datum, View};
-use littoral_gpu::{Gpu, Ground, Look, Triangles};
+use littoral_gpu::{Gpu, Ground, Look, ShapeTexture, Triangles};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// A land and its light, ready to be drawn.
 #[derive(Clone, Debug)]
@@ -19,6 +19,8 @@ pub struct Scenery {
     /// For pictures in the light of the data; shared with the scene, which brings the sky of other heights.
     full: Option<Arc<Mutex<littoral_gpu::Scenery>>>,
     plain: Arc<plain::Scenery>,
+    /// For rays, once they are asked for; nothing if the device has no room.
+    shape: Arc<OnceLock<Option<ShapeTexture>>>,
     /// How often it has changed since.
     changes: Arc<AtomicU64>,
 }
@@ -37,7 +39,8 @@ impl Scenery {
             Ok(scenery) => (Some(Arc::new(Mutex::new(scenery))), None),
             Err(problem) => (None, Some(problem)),
         };
-        (Scenery { full, plain: Arc::new(plain::Scenery::new(stage)), changes: Arc::default() }, problem)
+        let plain = Arc::new(plain::Scenery::new(stage));
+        (Scenery { full, plain, shape: Arc::default(), changes: Arc::default() }, problem)
     }
 
     /// Which scenery it is, and in which state.
@@ -59,6 +62,16 @@ impl Scenery {
             full.lock().unwrap_or_else(PoisonError::into_inner).follow_waves(gpu, sea);
             self.changes.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    /// Makes the ground ready for rays. What cannot be is drawn as triangles; the sentence says why, once.
+    pub fn bring_rays(&self, gpu: &Gpu, stage: &Stage<'_>) -> Result<(), String> {
+        let mut problem = None;
+        self.shape.get_or_init(|| {
+            self.changes.fetch_add(1, Ordering::Relaxed);
+            ShapeTexture::new(gpu, stage.land()).map_err(|e| problem = Some(format!("{e}; drawn as triangles"))).ok()
+        });
+        problem.map_or(Ok(()), Err)
     }
 
     /// Brings the sky as it is seen from a height (m), if it is another one. The lock is held while it is copied, not while it is made.
@@ -289,7 +302,12 @@ impl Renderer {
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let locked = full.lock().unwrap_or_else(PoisonError::into_inner);
         let ground = &self.grounds[side];
-        self.full.draw(gpu, &mut encoder, &locked, Ground::Triangles(ground), view, look);
+        let shape = seen.scenery.shape.get().and_then(Option::as_ref);
+        let source = match shape.filter(|_| choice.detail.shows_rays(settings.style, settings.show)) {
+            Some(shape) => Ground::Rays { shape, pixels: 0.0 },
+            None => Ground::Triangles(ground),
+        };
+        self.full.draw(gpu, &mut encoder, &locked, source, view, look);
         match surface {
             true => self.full.show(gpu, &mut encoder, &locked, seen.grey, target, size),
             false => clear(&mut encoder, target, [0.82, 0.84, 0.86]),

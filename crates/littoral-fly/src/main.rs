@@ -84,6 +84,9 @@ struct Arguments {
     /// Another method beside it, as fine and with as many triangles: two pictures of the same view, and how far apart they are
     #[arg(long, value_name = "METHOD")]
     against: Option<Method>,
+    /// The exact ground by rays in place of the method's mesh, in natural pictures
+    #[arg(long)]
+    rays: bool,
     /// How the picture is drawn: in the light of the data, or as the triangles themselves
     #[arg(long, value_parser = named::<Style>, value_name = "natural|plain")]
     style: Option<Style>,
@@ -151,8 +154,10 @@ impl Arguments {
         first.triangles = self.triangles.unwrap_or(first.triangles);
         settings.budget_milliseconds = self.budget.unwrap_or(settings.budget_milliseconds);
         if let Some(method) = self.against {
-            (settings.second, settings.split) = (Detail { method, ..*first }, Split::Halves);
+            (settings.second, settings.split) = (Detail { method, rays: false, ..*first }, Split::Halves);
         }
+        // A second method stays a mesh: so the two show how wrong it is.
+        settings.first.rays |= self.rays;
         settings.style = self.style.unwrap_or(settings.style);
         settings.coarse = self.coarse.unwrap_or(settings.coarse);
         settings.show = self.show.unwrap_or(settings.show);

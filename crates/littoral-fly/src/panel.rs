@@ -68,7 +68,9 @@ pub fn show(ui: &mut Ui, cockpit: &mut Cockpit, shown: &mut Shown, size: UVec2, 
 /// The line between two pictures: its handle can be dragged.
 fn divider(ui: &Ui, cockpit: &mut Cockpit) {
     let screen = ui.ctx().content_rect();
-    let names = cockpit.frame.as_ref().map(|f| (f.first.detail.method, f.second.as_ref().map(|s| s.detail.method)));
+    let (style, show) = (cockpit.settings.style, cockpit.settings.show);
+    let name = |choice: &Choice| choice.detail.name(style, show);
+    let names = cockpit.frame.as_ref().map(|f| (name(&f.first), f.second.as_ref().map(name)));
     let middle = egui::pos2(screen.left() + cockpit.divider * screen.width(), screen.center().y);
     let area = egui::Area::new(egui::Id::unique("divider")).fixed_pos(middle).pivot(Align2::CENTER_CENTER);
     area.show(ui.ctx(), |ui| {
@@ -84,8 +86,8 @@ fn divider(ui: &Ui, cockpit: &mut Cockpit) {
             let painter = ui.ctx().layer_painter(egui::LayerId::background());
             for (name, at, align) in [(first, -14.0, Align2::RIGHT_TOP), (second, 14.0, Align2::LEFT_TOP)] {
                 let at = egui::pos2(middle.x + at, screen.top() + 12.0);
-                painter.text(at + egui::vec2(1.0, 1.0), align, name.name(), font.clone(), Color32::BLACK);
-                painter.text(at, align, name.name(), font.clone(), Color32::WHITE);
+                painter.text(at + egui::vec2(1.0, 1.0), align, name, font.clone(), Color32::BLACK);
+                painter.text(at, align, name, font.clone(), Color32::WHITE);
             }
         }
         cockpit.divider = (cockpit.divider + response.drag_delta().x / screen.width().max(1.0)).clamp(0.02, 0.98);
@@ -255,7 +257,7 @@ fn detail(ui: &mut Ui, cockpit: &mut Cockpit, asks: &mut Vec<Ask>) {
             }
             ui.push_id("second", |ui| choice(ui, &mut settings.second, None));
             let (frame, difference) = (&cockpit.frame, cockpit.difference);
-            compared(ui, frame.as_ref().and_then(|f| Some((&f.first, f.second.as_ref()?))), difference);
+            compared(ui, settings, frame.as_ref().and_then(|f| Some((&f.first, f.second.as_ref()?))), difference);
         }
         ui.horizontal(|ui| {
             for each in Style::ALL {
@@ -288,17 +290,21 @@ fn choice(ui: &mut Ui, detail: &mut Detail, steered: Option<f64>) {
         detail.tolerance_pixels = tolerance;
     }
     ui.add(Slider::new(&mut detail.triangles, 1000..=5_000_000).logarithmic(true).text("most triangles"));
+    ui.checkbox(&mut detail.rays, "exact ground, by rays")
+        .on_hover_text("Natural pictures without edges show no triangles, but the ground as it is");
 }
 
 /// Two methods in figures.
-fn compared(ui: &mut Ui, choices: Option<(&Choice, &Choice)>, difference: Option<Difference>) {
+fn compared(ui: &mut Ui, settings: &Settings, choices: Option<(&Choice, &Choice)>, difference: Option<Difference>) {
     let Some((first, second)) = choices else { return };
     egui::Grid::new("compared").num_columns(3).spacing([10.0, 2.0]).show(ui, |ui| {
         for each in [first, second] {
-            ui.label(RichText::new(each.detail.method.name()).small());
-            ui.label(RichText::new(format!("{} triangles", thousands(each.triangles()))).small());
-            let words = format!("{:.2} px, {:.1} ms", each.ground_reached.pixels, each.milliseconds);
-            ui.label(RichText::new(words).small());
+            ui.label(RichText::new(each.detail.name(settings.style, settings.show)).small());
+            if !each.detail.shows_rays(settings.style, settings.show) {
+                ui.label(RichText::new(format!("{} triangles", thousands(each.triangles()))).small());
+                let words = format!("{:.2} px, {:.1} ms", each.ground_reached.pixels, each.milliseconds);
+                ui.label(RichText::new(words).small());
+            }
             ui.end_row();
         }
     });

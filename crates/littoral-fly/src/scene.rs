@@ -339,6 +339,11 @@ fn fly(
                     }
                     (answered, seen) = (None, (false, f64::NAN));
                 }
+                if (wish.first.rays || wish.second.is_some_and(|second| second.rays))
+                    && let Err(problem) = scenery.bring_rays(gpu, &stage)
+                {
+                    voice.tell(News::Note(problem));
+                }
                 // A sky takes long: no more than a quarter of the time is spent on skies.
                 if sky.1.elapsed() > 3 * sky.0 {
                     let begun = Instant::now();

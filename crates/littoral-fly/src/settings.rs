@@ -96,11 +96,25 @@ pub struct Detail {
     pub tolerance_pixels: f64,
     /// The most triangles of the ground, and as many of the sea.
     pub triangles: u32,
+    /// Whether natural pictures show the exact ground by rays in place of the mesh.
+    pub rays: bool,
+}
+
+impl Detail {
+    /// What its pictures are called in a style.
+    pub fn name(&self, style: Style, show: Show) -> &'static str {
+        if self.shows_rays(style, show) { "rays" } else { self.method.name() }
+    }
+
+    /// Whether pictures of a style show the ground by rays: edges belong to triangles.
+    pub fn shows_rays(&self, style: Style, show: Show) -> bool {
+        self.rays && style == Style::Natural && show == Show::Textured
+    }
 }
 
 impl Default for Detail {
     fn default() -> Detail {
-        Detail { method: Method::Quadtree, tolerance_pixels: 1.0, triangles: 150_000 }
+        Detail { method: Method::Quadtree, tolerance_pixels: 1.0, triangles: 150_000, rays: false }
     }
 }
 
