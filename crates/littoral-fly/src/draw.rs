@@ -9,7 +9,7 @@ use glam::{Mat4, UVec2, Vec2};
 use littoral::field::{HeightField, Sea};
 use littoral::picture::Stage;
 use littoral::space::{Datum, View};
-use littoral_gpu::{Gpu, Ground, Look, ShapeTexture, Triangles};
+use littoral_gpu::{Gpu, Ground, Look, ShapeTexture, Triangles, Waves};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -51,9 +51,12 @@ impl Scenery {
     /// Draws the waves of a sea from now on, or still water. What cannot be drawn lies still; the sentence says why.
     pub fn set_waves(&self, gpu: &Gpu, sea: Option<&Sea>) -> Result<(), String> {
         let Some(full) = &self.full else { return Ok(()) };
-        let set = full.lock().unwrap_or_else(PoisonError::into_inner).set_waves(gpu, sea);
+        // The lock is held while they are handed over, not while they are made.
+        let waves = sea.map(|sea| Waves::new(gpu, sea)).transpose();
+        let (waves, problem) = waves.map_or_else(|e| (None, Some(e)), |waves| (waves.flatten(), None));
+        full.lock().unwrap_or_else(PoisonError::into_inner).set_waves(waves);
         self.changes.fetch_add(1, Ordering::Relaxed);
-        set.map_err(|e| format!("{e}; natural pictures show still water"))
+        problem.map_or(Ok(()), |e| Err(format!("{e}; natural pictures show still water")))
     }
 
     /// Goes on to the instant at which the sea of [`Scenery::set_waves`] stands now.

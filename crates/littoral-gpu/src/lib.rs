@@ -33,4 +33,4 @@ pub use sea::GpuSea;
 pub use tessellator::{TESSELLATION_SHADERS, Tessellated, Tessellator};
 pub use times::PassTimes;
 pub use triangles::{TooMany, Triangles};
-pub use waves::{WavesError, wave_shaders};
+pub use waves::{Waves, WavesError, wave_shaders};

@@ -7,7 +7,7 @@ use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
 use crate::tessellator::{Tessellated, Tessellator};
 use crate::triangles::{TooMany, Triangles};
-use crate::waves::WavesError;
+use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
 use littoral::field::{HeightField, Land, Sea};
 use littoral::lod::{Limits, Mesh, ViewError};
@@ -110,7 +110,9 @@ impl Painter {
     /// # Errors
     /// If the sea is made in ways that the device does not know, or too large for it.
     pub fn set_waves(&mut self, sea: Option<&Sea>) -> Result<(), PainterError> {
-        self.scenery.set_waves(&self.gpu, sea)?;
+        let sea = sea.filter(|_| self.scenery.shows_waves());
+        let waves = sea.map(|sea| Waves::new(&self.gpu, sea)).transpose()?.flatten();
+        self.scenery.set_waves(waves);
         Ok(self.gpu.check()?)
     }
 

@@ -204,20 +204,9 @@ impl Renderer {
     fn canvas(&mut self, gpu: &Gpu, size: UVec2) -> &Canvas {
         let kept = self.canvas.take().filter(|canvas| canvas.size == size);
         self.canvas.insert(kept.unwrap_or_else(|| {
-            let make = |label, format, usage| {
-                gpu.device.create_texture(&wgpu::TextureDescriptor {
-                    label: Some(label),
-                    size: wgpu::Extent3d { width: size.x.max(1), height: size.y.max(1), depth_or_array_layers: 1 },
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-                    view_formats: &[],
-                })
-            };
-            let depth = make("depth", DEPTH, wgpu::TextureUsages::empty()).create_view(&Default::default());
-            let radiance = make("radiance", RADIANCE, wgpu::TextureUsages::COPY_SRC);
+            let depth = drawable(gpu, "depth", size, DEPTH, wgpu::TextureUsages::empty());
+            let depth = depth.create_view(&Default::default());
+            let radiance = drawable(gpu, "radiance", size, RADIANCE, wgpu::TextureUsages::COPY_SRC);
             Canvas { size, depth, radiance, wet: Wet::new(gpu, UVec2::ONE, DEPTH) }
         }))
     }
@@ -450,6 +439,26 @@ impl Renderer {
         let rows = mapped.chunks_exact(row as usize);
         Ok(rows.flat_map(|r| bytemuck::cast_slice::<u8, [f32; 4]>(&r[..width as usize * 16])).copied().collect())
     }
+}
+
+/// A texture of a size (pixels, at least one each way) that passes draw and shaders read.
+pub(crate) fn drawable(
+    gpu: &Gpu,
+    label: &str,
+    size: UVec2,
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width: size.x.max(1), height: size.y.max(1), depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    })
 }
 
 /// A colour attachment that keeps what is drawn.

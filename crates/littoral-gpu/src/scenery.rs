@@ -3,7 +3,7 @@
 use crate::coat::GpuCoat;
 use crate::device::Gpu;
 use crate::frame::LEVELS;
-use crate::waves::{Waves, WavesError};
+use crate::waves::Waves;
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
 use littoral::field::Sea;
@@ -231,20 +231,17 @@ impl Scenery {
         self.sky_height = height;
     }
 
-    /// Draws the waves of a sea on the water, where it stands now, from here on; or still water. On maps water is a colour.
-    ///
-    /// # Errors
-    /// If the sea is made in ways that the device does not know, or too large for it; then nothing changes.
-    pub fn set_waves(&mut self, gpu: &Gpu, sea: Option<&Sea>) -> Result<(), WavesError> {
-        self.waves = sea
-            .filter(|_| self.level.is_some() && self.coat.kind != 1.0)
-            .map(|sea| Waves::new(gpu, sea))
-            .transpose()?
-            .flatten();
-        Ok(())
+    /// Whether there is water that waves can be drawn on: on maps it is a colour.
+    pub fn shows_waves(&self) -> bool {
+        self.level.is_some() && self.coat.kind != 1.0
     }
 
-    /// Goes on to the instant at which the sea of [`Scenery::set_waves`] stands now.
+    /// Draws waves on the water from here on, or still water.
+    pub fn set_waves(&mut self, waves: Option<Waves>) {
+        self.waves = waves.filter(|_| self.shows_waves());
+    }
+
+    /// Goes on to the instant at which the sea stands now that the waves of [`Scenery::set_waves`] were made of.
     pub fn follow_waves(&mut self, gpu: &Gpu, sea: &Sea) {
         if let Some(waves) = &mut self.waves {
             waves.follow(gpu, sea);

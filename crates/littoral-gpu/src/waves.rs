@@ -8,6 +8,7 @@
 
 mod grid;
 
+use crate::renderer::drawable;
 use crate::sea::{self, GpuSea, shore::GpuShore};
 use crate::{Gpu, GpuError};
 use glam::{DVec2, UVec2};
@@ -49,8 +50,8 @@ pub enum WavesError {
     Unknown,
 }
 
-/// The waves of a sea at an instant.
-pub(crate) struct Waves {
+/// The waves of a sea at an instant, on the device: for [`Scenery::set_waves`](crate::Scenery::set_waves). To make them takes as long as their shaders take to compile.
+pub struct Waves {
     tiles: GpuSea,
     shore: GpuShore,
     finest: Finest,
@@ -60,7 +61,7 @@ pub(crate) struct Waves {
     /// Tells one instant of one sea from all others.
     instant: u64,
     /// How high swash reaches above still water (m), on the nodes of the bed, and where these are.
-    pub run_up: (wgpu::Texture, DVec2, DVec2),
+    pub(crate) run_up: (wgpu::Texture, DVec2, DVec2),
 }
 
 impl std::fmt::Debug for Waves {
@@ -142,7 +143,7 @@ impl Waves {
     }
 
     /// Goes to the instant at which a sea stands: the one that it was made of.
-    pub fn follow(&mut self, gpu: &Gpu, sea: &Sea) {
+    pub(crate) fn follow(&mut self, gpu: &Gpu, sea: &Sea) {
         self.time = sea.time();
         self.bounds = sea.bounds();
         self.instant = next_instant();
@@ -159,7 +160,7 @@ impl Waves {
     }
 
     /// Ripples finer than the waves.
-    pub fn finest(&self) -> Finest {
+    pub(crate) fn finest(&self) -> Finest {
         self.finest
     }
 }
@@ -176,22 +177,8 @@ pub(crate) struct Wet {
 impl Wet {
     /// For pictures of a size.
     pub fn new(gpu: &Gpu, size: UVec2, depth: wgpu::TextureFormat) -> Wet {
-        let make = |label, format, usage| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: size.x.max(1), height: size.y.max(1), depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: usage | wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            })
-        };
-        Wet {
-            depth: make("depth of the sea", depth, wgpu::TextureUsages::empty()),
-            seen: make("sea seen", wgpu::TextureFormat::Rgba32Uint, wgpu::TextureUsages::empty()),
-        }
+        let make = |label, format| drawable(gpu, label, size, format, wgpu::TextureUsages::empty());
+        Wet { depth: make("depth of the sea", depth), seen: make("sea seen", wgpu::TextureFormat::Rgba32Uint) }
     }
 }
 

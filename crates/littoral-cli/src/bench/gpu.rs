@@ -12,7 +12,9 @@ use littoral::field::{HeightField, Lakes, Land, Sea, Water, coast};
 use littoral::lod::{Drawing, Limits, Lod, Patches};
 use littoral::picture::{self, Display, Exposure, Picture, Scene, Settings, Shot, Stage};
 use littoral::space::{Cell, Datum, View};
-use littoral_gpu::{Gpu, GpuError, Ground, Look, Painter, PassTimes, Renderer, Scenery, ShapeTexture, Triangles};
+use littoral_gpu::{
+    Gpu, GpuError, Ground, Look, Painter, PassTimes, Renderer, Scenery, ShapeTexture, Triangles, Waves,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -144,7 +146,8 @@ impl GpuBench {
             for (name, view, waves) in &place.views {
                 let sea = place.sea.as_ref().filter(|_| *waves);
                 painter.set_waves(sea).map_err(|e| Failure::Work(e.to_string()))?;
-                frames.scenery.set_waves(&gpu, sea).map_err(|e| Failure::Work(e.to_string()))?;
+                let waves = sea.map(|sea| Waves::new(&gpu, sea)).transpose();
+                frames.scenery.set_waves(waves.map_err(|e| Failure::Work(e.to_string()))?.flatten());
                 let rows = self.view(&stage, sea, &mut painter, &mut frames, view, &mut sheet, &|| bar.inc(1))?;
                 views.push(Viewed { land: place.name.clone(), view: name, rows });
             }
