@@ -9,6 +9,7 @@ pub fn show(ui: &mut Ui, history: &History) {
     plot(ui, "frame", " ms", &history.frame, Color32::from_rgb(120, 200, 255));
     plot(ui, "method", " ms", &history.method, Color32::from_rgb(160, 230, 140));
     plot(ui, "triangles", "", &history.triangles, Color32::from_rgb(255, 200, 110));
+    plot(ui, "uploads", " MB", &history.uploads, Color32::from_rgb(210, 170, 255));
     plot(ui, "bound", " px", &history.bound, Color32::from_rgb(255, 140, 140));
 }
 
