@@ -49,6 +49,8 @@ pub struct Chooser<'a> {
     land: &'a Land,
     limits: Limits,
     ground: Box<dyn Lod>,
+    /// Land prepared for ROAM.
+    prepared: Option<&'a NestedBounds>,
     /// ROAM over prepared land, which goes on from picture to picture.
     flight: Option<RoamFlight<'a>>,
     ground_drawing: Drawing,
@@ -70,8 +72,8 @@ impl Drawer<'_> {
     pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Option<Told>, Failure> {
         let Some(chooser) = &mut self.chooser else { return Ok(None) };
         match &mut self.painter {
-            // What can look at all patches at once does it itself.
-            Some(painter) if chooser.is_patches() => chooser.tessellate(painter, view),
+            // What can look at all triangles at once chooses them itself.
+            Some(painter) if chooser.on_device() => chooser.choose_on(painter, view),
             _ => chooser.choose(sea, view),
         }
         .map(Some)
@@ -92,9 +94,7 @@ impl Drawer<'_> {
             }
             let told = |done| told(done);
             let painted = match &self.chooser {
-                Some(chooser) if chooser.is_patches() => {
-                    painter.picture_of_patches(stage, view, settings.samples, &told)
-                }
+                Some(chooser) if chooser.on_device() => painter.picture_of_chosen(stage, view, settings.samples, &told),
                 chooser => {
                     let ground = chooser.as_ref().map(Chooser::ground);
                     painter.picture(stage, ground, view, settings.samples, &told)
@@ -147,7 +147,8 @@ impl Detail {
             land,
             limits,
             ground: self.lod?.within(limits),
-            flight: prepared.map(|bounds| RoamFlight::over(bounds, limits)),
+            prepared,
+            flight: prepared.filter(|_| !self.gpu).map(|bounds| RoamFlight::over(bounds, limits)),
             ground_drawing: Drawing::default(),
             water: None,
             water_drawing: Drawing::default(),
@@ -217,15 +218,20 @@ impl Chooser<'_> {
         Ok(told)
     }
 
-    fn is_patches(&self) -> bool {
-        self.detail.lod == Some(Method::Patches)
+    /// Whether the graphics card knows the method.
+    fn on_device(&self) -> bool {
+        self.detail.gpu && (self.detail.lod == Some(Method::Patches) || self.prepared.is_some())
     }
 
     /// Lets the graphics card choose the ground for a view.
-    fn tessellate(&self, painter: &mut Painter, view: &View) -> Result<Told, Failure> {
+    fn choose_on(&self, painter: &mut Painter, view: &View) -> Result<Told, Failure> {
         let view = View { tolerance_pixels: self.detail.tolerance as f32, ..*view };
         let started = Instant::now();
-        let chosen = painter.tessellate(self.land, self.limits, &view).map_err(unpainted)?;
+        let chosen = match self.prepared {
+            Some(bounds) => painter.bisect(bounds, self.limits, &view),
+            None => painter.tessellate(self.land, self.limits, &view),
+        }
+        .map_err(unpainted)?;
         Ok(Told::of(chosen.reached, chosen.triangles as usize, started))
     }
 

@@ -9,7 +9,9 @@
 //!
 //! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
+mod bisector;
 mod coat;
+mod compute;
 mod device;
 mod frame;
 mod painter;
@@ -23,6 +25,7 @@ mod times;
 mod triangles;
 mod waves;
 
+pub use bisector::{BISECTION_SHADERS, Bisector};
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};

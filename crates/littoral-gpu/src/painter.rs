@@ -1,5 +1,6 @@
 //! Pictures without a window.
 
+use crate::bisector::Bisector;
 use crate::device::{Gpu, GpuError};
 use crate::frame::Look;
 use crate::rays::{ShapeError, ShapeTexture};
@@ -10,7 +11,7 @@ use crate::triangles::{TooMany, Triangles};
 use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
 use littoral::field::{HeightField, Land, Sea};
-use littoral::lod::{Limits, Mesh, ViewError};
+use littoral::lod::{Limits, Mesh, NestedBounds, ViewError};
 use littoral::picture::{Medium, Picture, Stage};
 use littoral::space::{Datum, View};
 
@@ -22,17 +23,33 @@ pub struct Painter {
     scenery: Scenery,
     triangles: Triangles,
     shape: Option<ShapeTexture>,
-    /// What was tessellated last, and the limits that were asked for.
-    patches: Option<(Limits, Tessellator)>,
+    /// What chose triangles last, and the limits that were asked for.
+    chooser: Option<(Limits, Chooser)>,
     white: [f32; 3],
     medium: Medium,
+}
+
+/// What chooses triangles on the device.
+#[derive(Debug)]
+enum Chooser {
+    Patches(Tessellator),
+    Bisection(Bisector),
+}
+
+impl Chooser {
+    fn triangles(&self) -> &Triangles {
+        match self {
+            Chooser::Patches(tessellator) => tessellator.triangles(),
+            Chooser::Bisection(bisector) => bisector.triangles(),
+        }
+    }
 }
 
 /// Where the ground of a picture comes from.
 enum Source<'a> {
     Mesh(&'a Mesh),
-    /// What was tessellated last.
-    Patches,
+    /// What the device chose last.
+    Chosen,
     Rays,
 }
 
@@ -99,7 +116,7 @@ impl Painter {
             scenery,
             triangles: Triangles::default(),
             shape: None,
-            patches: None,
+            chooser: None,
             white: tables.white,
             medium: tables.medium,
         })
@@ -147,29 +164,47 @@ impl Painter {
     /// # Errors
     /// If the land is larger than the device's textures, the view is not one that a picture can be drawn of, or the device was lost.
     pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
-        let patches = match self.patches.take() {
-            Some(patches) if patches.0 == limits => patches,
-            _ => (limits, Tessellator::new(&self.gpu, land, limits)?),
+        let mut tessellator = match self.chooser.take() {
+            Some((kept, Chooser::Patches(tessellator))) if kept == limits => tessellator,
+            _ => Tessellator::new(&self.gpu, land, limits)?,
         };
-        let (_, patches) = self.patches.insert(patches);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        patches.tessellate(&self.gpu, &mut encoder, view, None)?;
+        tessellator.tessellate(&self.gpu, &mut encoder, view, None)?;
         self.gpu.queue.submit([encoder.finish()]);
-        Ok(patches.read(&self.gpu)?)
+        let told = tessellator.read(&self.gpu)?;
+        self.chooser = Some((limits, Chooser::Patches(tessellator)));
+        Ok(told)
     }
 
-    /// The same as [`Painter::picture`], the ground being what was tessellated last.
+    /// The same by bisection, which goes on from what was chosen before: see [`Bisector`].
     ///
     /// # Errors
     /// As there.
-    pub fn picture_of_patches(
+    pub fn bisect(&mut self, bounds: &NestedBounds, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
+        let mut bisector = match self.chooser.take() {
+            Some((kept, Chooser::Bisection(bisector))) if kept == limits => bisector,
+            _ => Bisector::new(&self.gpu, bounds, limits)?,
+        };
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        bisector.bisect(&self.gpu, &mut encoder, view, None)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        let told = bisector.read(&self.gpu)?;
+        self.chooser = Some((limits, Chooser::Bisection(bisector)));
+        Ok(told)
+    }
+
+    /// The same as [`Painter::picture`], the ground being what was tessellated or bisected last.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn picture_of_chosen(
         &mut self,
         stage: &Stage,
         view: &View,
         looks: u32,
         progress: &dyn Fn(f32),
     ) -> Result<Picture, PainterError> {
-        self.paint(stage, Source::Patches, view, looks, progress)
+        self.paint(stage, Source::Chosen, view, looks, progress)
     }
 
     fn paint(
@@ -193,8 +228,8 @@ impl Painter {
                 self.triangles.set(gpu, mesh)?;
                 Ground::Triangles(&self.triangles)
             }
-            Source::Patches => {
-                Ground::Triangles(self.patches.as_ref().map_or(&self.triangles, |(_, patches)| patches.triangles()))
+            Source::Chosen => {
+                Ground::Triangles(self.chooser.as_ref().map_or(&self.triangles, |(_, chooser)| chooser.triangles()))
             }
             Source::Rays => {
                 let shape = match self.shape.take() {

@@ -1,7 +1,8 @@
 //! Triangles of a surface on the device.
 
-use crate::device::Gpu;
-use littoral::lod::Mesh;
+use crate::compute::read;
+use crate::device::{Gpu, GpuError};
+use littoral::lod::{Mesh, Vertex};
 
 /// Triangles of a surface on the device.
 #[derive(Debug, Default)]
@@ -30,6 +31,17 @@ impl Triangles {
         fill(gpu, &mut self.corners, "triangles", CORNERS, bytemuck::cast_slice(&mesh.triangles));
         (self.count, self.drawn) = (3 * triangles as u32, None);
         Ok(())
+    }
+
+    /// So many vertices and triangles, read back.
+    pub(crate) fn read(&self, gpu: &Gpu, vertices: u32, triangles: u32) -> Result<Mesh, GpuError> {
+        let (Some(from), Some(corners)) = (&self.vertices, &self.corners) else { return Ok(Mesh::default()) };
+        let vertices = read(gpu, from, u64::from(vertices) * size_of::<Vertex>() as u64)?;
+        let corners = read(gpu, corners, 12 * u64::from(triangles))?;
+        Ok(Mesh {
+            vertices: bytemuck::pod_collect_to_vec(&vertices),
+            triangles: bytemuck::pod_collect_to_vec(&corners),
+        })
     }
 
     /// How many triangles there are; how many there may be at most, if the device made them.
