@@ -250,11 +250,6 @@ impl Frame {
         self.georeference.crs.clone()
     }
 
-    /// Longitude and latitude (degrees) of coordinates.
-    pub fn lonlat(&self, crs: DVec2) -> Result<DVec2, String> {
-        self.georeference.lonlat_from_crs(crs)
-    }
-
     /// Distance between samples (m).
     pub fn spacing(&self) -> DVec2 {
         self.georeference.spacing()
