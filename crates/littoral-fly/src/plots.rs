@@ -39,7 +39,8 @@ fn plot(ui: &mut Ui, name: &str, unit: &str, values: &VecDeque<f32>, colour: Col
     painter.rect_filled(rect, 2.0, Color32::from_black_alpha(90));
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     // One stall shall not flatten all the rest.
-    let top = round_above(finite().fold(0.0, f32::max).min(8.0 * median(finite()).max(1e-6)));
+    let (most, usual) = (finite().fold(0.0, f32::max), median(finite()));
+    let top = round_above(if usual > 0.0 { most.min(8.0 * usual) } else { most });
     let step = rect.width() / (values.len().max(2) - 1) as f32;
     let points: Vec<egui::Pos2> = values
         .iter()

@@ -144,7 +144,7 @@ fn roam(ui: &mut Ui, roam: &mut Roam) {
     .on_hover_text("The most urgent comes first; what is left comes with the next frames");
     ui.checkbox(&mut roam.fog, "less in the haze").on_hover_text("As things fade by the visibility");
     let factor = |value, range, text| Slider::new(value, range).max_decimals(2).text(text);
-    ui.add(factor(&mut roam.back_faces, 0.0..=1.0, "× what faces away"));
+    ui.add(factor(&mut roam.back_faces, 0.0..=1.0, "× back faces"));
     ui.add(factor(&mut roam.silhouettes, 1.0..=8.0, "× silhouettes"));
     ui.add(factor(&mut roam.lighting, 0.0..=4.0, "+ uneven light"))
         .on_hover_text("One more for each unit that slopes differ by");

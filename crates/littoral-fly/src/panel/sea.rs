@@ -49,7 +49,7 @@ fn numbers(ui: &mut Ui, cockpit: &mut Cockpit) {
         ("hs", "m high", 0.1, 12.0, 0.1, None),
         ("tp", "s from crest to crest", 2.0, 20.0, 0.5, None),
         ("from", "° it comes from", 0.0, 360.0, 5.0, None),
-        ("breaking", "× depth: breaks", 0.2, 1.5, 0.01, Some(0.78)),
+        ("breaking", "× depth: they break", 0.2, 1.5, 0.01, Some(0.78)),
     ];
     for (key, name, low, high, step, usual) in sliders {
         let Some(mut value) = seastate::number(&cockpit.sea_text, key).or(usual) else { continue };
