@@ -16,7 +16,7 @@
 //! Works this rests on: J. Dupuy, "Concurrent binary trees", 2020 (bits under sums); A. Benyoub and J. Dupuy, "Concurrent binary trees for large-scale game components",
 //! 2024 (splits and merges of every frame, which there wait for and force each other); M. Duchaineau et al., "ROAMing terrain", 1997.
 
-use crate::compute::{TEXELS, bind, binding, layout, numbers, read};
+use crate::compute::{TEXELS, VOID, bind, binding, layout, numbers, read};
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use crate::tessellator::Tessellated;
@@ -166,8 +166,6 @@ const WORD_BYTES: u64 = 8;
 const BLOCK_BYTES: u64 = 12;
 /// Bins of the census.
 const BINS: u64 = (0x7f80_0000 >> 15) + 1;
-/// A height that is not finite.
-const VOID: u32 = f32::INFINITY.to_bits();
 
 impl Bisector {
     /// Brings a land to the device: heights and what [`NestedBounds`] know, about twelve bytes a sample. Nothing finer than its samples is drawn, and fewer triangles

@@ -1,6 +1,8 @@
 //! What all compute passes need: layouts and groups of bindings, textures of numbers, buffers read back.
 
 use crate::device::{Gpu, GpuError};
+use crate::scenery::TooLarge;
+use littoral::field::Land;
 
 /// A texture of whole numbers that is read texel by texel.
 pub(crate) const TEXELS: wgpu::BindingType = wgpu::BindingType::Texture {
@@ -57,6 +59,27 @@ pub(crate) fn read(gpu: &Gpu, from: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
     let mapped = buffer.get_mapped_range(..).map_err(|e| lost(&e))?;
     Ok(mapped.to_vec())
+}
+
+/// A height that is not finite.
+pub(crate) const VOID: u32 = f32::INFINITY.to_bits();
+
+/// Bits of a land's heights (m), [`VOID`] where there is none.
+///
+/// # Errors
+/// If the land has more samples along a side than the device's textures.
+pub(crate) fn heights(gpu: &Gpu, land: &Land) -> Result<wgpu::Texture, TooLarge> {
+    let raster = land.raster();
+    let (columns, rows) = (raster.columns(), raster.rows());
+    let most = gpu.device.limits().max_texture_dimension_2d;
+    if columns.max(rows) > most as usize {
+        return Err(TooLarge { columns, rows, most });
+    }
+    Ok(numbers(gpu, "heights", wgpu::TextureFormat::R32Uint, columns, rows, |row, line: &mut Vec<u32>| {
+        let first = row * columns;
+        let of = |(i, height): (usize, &f32)| if raster.voids().is_void(first + i) { VOID } else { height.to_bits() };
+        line.extend(raster.heights()[first..first + columns].iter().enumerate().map(of));
+    }))
 }
 
 /// Bytes that are brought to the device together.

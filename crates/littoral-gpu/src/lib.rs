@@ -13,6 +13,7 @@ mod bisector;
 mod coat;
 mod compute;
 mod device;
+mod expander;
 mod frame;
 mod painter;
 pub mod rays;
@@ -27,6 +28,7 @@ mod waves;
 
 pub use bisector::{BISECTION_SHADERS, Bisector};
 pub use device::{Gpu, GpuError};
+pub use expander::{EXPANSION_SHADER, Expander};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};
 pub use rays::{ShapeError, ShapeTexture};

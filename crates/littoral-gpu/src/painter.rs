@@ -2,6 +2,7 @@
 
 use crate::bisector::Bisector;
 use crate::device::{Gpu, GpuError};
+use crate::expander::Expander;
 use crate::frame::Look;
 use crate::rays::{ShapeError, ShapeTexture};
 use crate::renderer::{Ground, Renderer};
@@ -11,7 +12,7 @@ use crate::triangles::{TooMany, Triangles};
 use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
 use littoral::field::{HeightField, Land, Sea};
-use littoral::lod::{Limits, Mesh, NestedBounds, ViewError};
+use littoral::lod::{Drawing, Limits, Mesh, NestedBounds, ViewError};
 use littoral::picture::{Medium, Picture, Stage};
 use littoral::space::{Datum, View};
 
@@ -23,24 +24,26 @@ pub struct Painter {
     scenery: Scenery,
     triangles: Triangles,
     shape: Option<ShapeTexture>,
-    /// What chose triangles last, and the limits that were asked for.
-    chooser: Option<(Limits, Chooser)>,
+    /// What made triangles last.
+    maker: Option<Maker>,
     white: [f32; 3],
     medium: Medium,
 }
 
-/// What chooses triangles on the device.
+/// What makes triangles on the device, with the limits that were asked for.
 #[derive(Debug)]
-enum Chooser {
-    Patches(Tessellator),
-    Bisection(Bisector),
+enum Maker {
+    Patches(Limits, Tessellator),
+    Bisection(Limits, Bisector),
+    Drawing(Expander),
 }
 
-impl Chooser {
+impl Maker {
     fn triangles(&self) -> &Triangles {
         match self {
-            Chooser::Patches(tessellator) => tessellator.triangles(),
-            Chooser::Bisection(bisector) => bisector.triangles(),
+            Maker::Patches(_, tessellator) => tessellator.triangles(),
+            Maker::Bisection(_, bisector) => bisector.triangles(),
+            Maker::Drawing(expander) => expander.triangles(),
         }
     }
 }
@@ -48,8 +51,8 @@ impl Chooser {
 /// Where the ground of a picture comes from.
 enum Source<'a> {
     Mesh(&'a Mesh),
-    /// What the device chose last.
-    Chosen,
+    /// What the device made last.
+    Made,
     Rays,
 }
 
@@ -116,7 +119,7 @@ impl Painter {
             scenery,
             triangles: Triangles::default(),
             shape: None,
-            chooser: None,
+            maker: None,
             white: tables.white,
             medium: tables.medium,
         })
@@ -164,47 +167,62 @@ impl Painter {
     /// # Errors
     /// If the land is larger than the device's textures, the view is not one that a picture can be drawn of, or the device was lost.
     pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
-        let mut tessellator = match self.chooser.take() {
-            Some((kept, Chooser::Patches(tessellator))) if kept == limits => tessellator,
+        let mut tessellator = match self.maker.take() {
+            Some(Maker::Patches(kept, tessellator)) if kept == limits => tessellator,
             _ => Tessellator::new(&self.gpu, land, limits)?,
         };
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         tessellator.tessellate(&self.gpu, &mut encoder, view, None)?;
         self.gpu.queue.submit([encoder.finish()]);
         let told = tessellator.read(&self.gpu)?;
-        self.chooser = Some((limits, Chooser::Patches(tessellator)));
+        self.maker = Some(Maker::Patches(limits, tessellator));
         Ok(told)
     }
 
-    /// The same by bisection, which goes on from what was chosen before: see [`Bisector`].
+    /// The same by bisection, which goes on from what was drawn before: see [`Bisector`].
     ///
     /// # Errors
     /// As there.
     pub fn bisect(&mut self, bounds: &NestedBounds, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
-        let mut bisector = match self.chooser.take() {
-            Some((kept, Chooser::Bisection(bisector))) if kept == limits => bisector,
+        let mut bisector = match self.maker.take() {
+            Some(Maker::Bisection(kept, bisector)) if kept == limits => bisector,
             _ => Bisector::new(&self.gpu, bounds, limits)?,
         };
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         bisector.bisect(&self.gpu, &mut encoder, view, None)?;
         self.gpu.queue.submit([encoder.finish()]);
         let told = bisector.read(&self.gpu)?;
-        self.chooser = Some((limits, Chooser::Bisection(bisector)));
+        self.maker = Some(Maker::Bisection(limits, bisector));
         Ok(told)
     }
 
-    /// The same as [`Painter::picture`], the ground being what was tessellated or bisected last.
+    /// Turns what a method drew of a land, that of the stage, into triangles on the device: see [`Expander`]. Returns how many there are.
+    ///
+    /// # Errors
+    /// If the land or the drawing is larger than the device's textures or buffers, or the device was lost.
+    pub fn expand(&mut self, land: &Land, drawing: &mut Drawing) -> Result<usize, PainterError> {
+        let mut expander = match self.maker.take() {
+            Some(Maker::Drawing(expander)) => expander,
+            _ => Expander::new(&self.gpu, land)?,
+        };
+        expander.expand(&self.gpu, drawing)?;
+        let count = expander.count(&self.gpu)?;
+        self.maker = Some(Maker::Drawing(expander));
+        Ok(count as usize)
+    }
+
+    /// The same as [`Painter::picture`], the ground being the triangles that the device made last.
     ///
     /// # Errors
     /// As there.
-    pub fn picture_of_chosen(
+    pub fn picture_of_made(
         &mut self,
         stage: &Stage,
         view: &View,
         looks: u32,
         progress: &dyn Fn(f32),
     ) -> Result<Picture, PainterError> {
-        self.paint(stage, Source::Chosen, view, looks, progress)
+        self.paint(stage, Source::Made, view, looks, progress)
     }
 
     fn paint(
@@ -228,9 +246,7 @@ impl Painter {
                 self.triangles.set(gpu, mesh)?;
                 Ground::Triangles(&self.triangles)
             }
-            Source::Chosen => {
-                Ground::Triangles(self.chooser.as_ref().map_or(&self.triangles, |(_, chooser)| chooser.triangles()))
-            }
+            Source::Made => Ground::Triangles(self.maker.as_ref().map_or(&self.triangles, Maker::triangles)),
             Source::Rays => {
                 let shape = match self.shape.take() {
                     Some(shape) => shape,

@@ -233,7 +233,7 @@ fn a_picture_of_bisection_is_that_of_its_mesh() {
     let told = painter.bisect(&bounds, limits, &shot.view).expect("a small land");
     assert_eq!(told.triangles as usize, drawing.mesh.triangles.len());
     assert!((told.reached.pixels - reached.pixels).abs() < 1e-3 * reached.pixels, "{told:?} for {reached:?}");
-    let chosen = painter.picture_of_chosen(&stage, &shot.view, 1, &|_| {}).expect("a picture");
+    let chosen = painter.picture_of_made(&stage, &shot.view, 1, &|_| {}).expect("a picture");
     let mesh = painter.picture(&stage, Some(&drawing.mesh), &shot.view, 1, &|_| {}).expect("a picture");
     assert_eq!(chosen.radiance, mesh.radiance);
     assert_eq!(chosen.depth, mesh.depth);

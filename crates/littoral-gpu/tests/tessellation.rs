@@ -206,7 +206,7 @@ fn views_and_lands_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn a_picture_of_chosen_is_that_of_their_mesh() {
+fn a_picture_of_made_is_that_of_their_mesh() {
     let Some((gpu, _alone)) = gpu() else { return };
     let size = UVec2::new(96, 54);
     let land = coast::coast();
@@ -220,7 +220,7 @@ fn a_picture_of_chosen_is_that_of_their_mesh() {
     let told = painter.tessellate(&land, limits, &shot.view).expect("a small land");
     assert_eq!(told.triangles as usize, drawing.mesh.triangles.len());
     assert!((told.reached.pixels - reached.pixels).abs() < 1e-3 * reached.pixels, "{told:?} for {reached:?}");
-    let patches = painter.picture_of_chosen(&stage, &shot.view, 1, &|_| {}).expect("a picture");
+    let patches = painter.picture_of_made(&stage, &shot.view, 1, &|_| {}).expect("a picture");
     let mesh = painter.picture(&stage, Some(&drawing.mesh), &shot.view, 1, &|_| {}).expect("a picture");
     assert_eq!(patches.radiance, mesh.radiance);
     assert_eq!(patches.depth, mesh.depth);

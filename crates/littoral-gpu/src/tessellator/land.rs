@@ -1,6 +1,6 @@
 //! What a land says about its cells, as textures.
 
-use crate::compute::numbers;
+use crate::compute::{heights, numbers};
 use crate::device::Gpu;
 use crate::scenery::TooLarge;
 use glam::DVec2;
@@ -20,7 +20,7 @@ pub(super) struct DeviceLand {
     pub rows: u32,
     /// Height (m) of step 0, and of a step, of the ranges.
     pub scale: (f32, f32),
-    /// Bits of the heights, [`VOID`] where there is none.
+    /// Bits of the heights, not finite where there is none.
     pub heights: wgpu::Texture,
     /// Two numbers a cell: its range in steps (low in the lower half) and the bits of its error. The first texture holds the levels [`TOGETHER`], one after the other from west to
     /// east, the others one each. Cells between four samples are told by these.
@@ -32,28 +32,12 @@ const TOGETHER: u8 = 6;
 
 const CELLS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 
-/// A height that is not finite.
-const VOID: u32 = f32::INFINITY.to_bits();
-
 impl DeviceLand {
     pub fn new(gpu: &Gpu, land: &Land) -> Result<DeviceLand, TooLarge> {
+        let heights = heights(gpu, land)?;
         let raster = land.raster();
         let (columns, rows) = (raster.columns(), raster.rows());
-        let most = gpu.device.limits().max_texture_dimension_2d;
-        if columns.max(rows) > most as usize {
-            return Err(TooLarge { columns, rows, most });
-        }
         let finest = land.finest_level();
-        let heights =
-            numbers(gpu, "heights", wgpu::TextureFormat::R32Uint, columns, rows, |row, line: &mut Vec<u32>| {
-                let first = row * columns;
-                line.extend(
-                    raster.heights()[first..first + columns]
-                        .iter()
-                        .enumerate()
-                        .map(|(i, height)| if raster.voids().is_void(first + i) { VOID } else { height.to_bits() }),
-                );
-            });
         let first = TOGETHER.min(finest);
         let width = (1usize << first) - 1;
         let together = numbers(gpu, "first cells", CELLS, width.max(1), width.div_ceil(2).max(1), |row, line| {
