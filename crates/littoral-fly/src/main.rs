@@ -41,8 +41,8 @@ use std::process::ExitCode;
 
 /// Fly over any land and its sea, walk on it, sail on it, and change how it is drawn while you look.
 ///
-/// Without FILE the built-in coast is opened. Files can also be dropped on the window: height files become the land, a path's file (.toml) is
-/// loaded. Settings are remembered from flight to flight.
+/// Without FILE the built-in coast is opened. Files can also be dropped on the window: height files become the land, a picture is laid over the ground, a path's
+/// file (.toml) is loaded. Settings are remembered from flight to flight.
 #[derive(Parser)]
 #[command(
     name = "littoral-fly",

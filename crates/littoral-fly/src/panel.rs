@@ -108,7 +108,7 @@ fn help(ui: &Ui, shown: &mut Shown) {
                 }
             });
             ui.separator();
-            ui.label("Drop height files on the window to fly over them, a path's file to fly along it.");
+            ui.label("Drop height files on the window to fly over them, a picture to lay it over the ground, a path's file to fly along it.");
         },
     );
 }
