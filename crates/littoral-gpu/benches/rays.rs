@@ -59,7 +59,7 @@ fn map(gpu: &Gpu, side: usize, size: UVec2) {
     println!("  pyramid: {:.3} ms for {:.1} MB, {:.2} GB/s", built.0, 1e-6 * bytes, 1e-6 * bytes / built.0);
 
     let stage = Stage::new(&Scene::new(&land, None));
-    let tables = stage.tables().expect("natural colours");
+    let tables = stage.tables();
     let Datum::Plane { origin, size: extent } = land.datum() else { return };
     let sky = stage.sky_table(eye.z);
     let scenery = Scenery::new(gpu, &tables, (origin, extent), (eye.z, &sky)).expect("a map that fits");

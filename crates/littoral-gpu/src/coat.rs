@@ -1,4 +1,4 @@
-//! What the ground is seen as, on the device: nothing but nature, tints by height, or a picture laid over it.
+//! What the ground is seen as, on the device: nothing but nature, tints by height, a picture laid over it, or a shaded relief.
 
 use crate::Gpu;
 use glam::{DAffine2, DVec2, UVec2, Vec3};
@@ -10,7 +10,7 @@ use wgpu::{TextureDimension, TextureFormat};
 pub(crate) struct GpuCoat {
     /// Colours of tints, land in the first row and bed in the second; or the picture, with its means.
     pub texture: wgpu::Texture,
-    /// 0 for nature, 1 for tints, 2 for a picture.
+    /// 0 for nature, 1 for tints, 2 for a picture, 3 for a shaded relief.
     pub kind: f32,
     /// Heights (m) of the lowest ground, of the land's foot and of the highest ground; by how much slopes are steepened.
     pub tint: [f32; 4],
@@ -42,10 +42,19 @@ impl GpuCoat {
                 let tint = [*low, *foot, *high, *steepening];
                 GpuCoat { kind: 1.0, tint, lake: *lake, ..plain(texture) }
             }
+            Coat::Relief { lake, heights: [low, foot, high], steepening } => {
+                let tint = [*low, *foot, *high, *steepening];
+                GpuCoat { kind: 3.0, tint, lake: *lake, ..plain(make(TextureFormat::Rgba8Unorm, [1, 1], &[0; 4])) }
+            }
             Coat::Image(drape) => {
                 GpuCoat { kind: 2.0, uv_from_local: drape.uv_from_local, ..plain(picture(gpu, &drape.texture)) }
             }
         }
+    }
+
+    /// Whether it makes a map, on which water is a colour.
+    pub fn is_map(&self) -> bool {
+        self.kind == 1.0 || self.kind == 3.0
     }
 
     /// From the eye (m) to the picture: both columns of a matrix, and where the eye is.

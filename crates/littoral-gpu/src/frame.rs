@@ -216,7 +216,7 @@ impl Uniforms {
         }
         let level = scenery.level.map_or(0.0, |level| (level - eye.z) as f32);
         let drape = scenery.coat.uv_from_eye(flat);
-        let is_map = scenery.coat.kind == 1.0;
+        let is_map = scenery.coat.is_map();
         let flag = |yes: bool| f32::from(u8::from(yes));
         Uniforms {
             clip_from_eye: clip_from_eye.to_cols_array(),

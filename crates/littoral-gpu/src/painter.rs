@@ -68,11 +68,9 @@ pub enum PainterError {
     #[error(transparent)]
     Waves(#[from] WavesError),
     /// Something that it does not draw.
-    #[error(
-        "expected land on a plane in natural colours, tints or a picture, got {got}: the GPU does not draw that yet; draw it on the processor"
-    )]
+    #[error("expected land on a plane, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
-        /// What the stage shows.
+        /// What the stage stands on.
         got: &'static str,
     },
 }
@@ -81,14 +79,12 @@ impl Painter {
     /// A painter of a stage.
     ///
     /// # Errors
-    /// If the stage is a shaded relief, stands on an ellipsoid, or is larger than the device's textures.
+    /// If the stage stands on an ellipsoid, or is larger than the device's textures.
     pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
-        let Some(tables) = stage.tables() else {
-            return Err(PainterError::Unknown { got: "a shaded relief" });
-        };
         let Datum::Plane { origin, size } = stage.land().datum() else {
             return Err(PainterError::Unknown { got: "an ellipsoid" });
         };
+        let tables = stage.tables();
         let height = f64::from(stage.land().height_range().high).max(2.0);
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
@@ -184,6 +180,9 @@ impl Painter {
         let most = gpu.device.limits().max_texture_dimension_2d;
         if view.size.max_element() > most {
             return Err(PainterError::Picture { got: view.size, most });
+        }
+        if view.size.min_element() == 0 {
+            return Ok(Picture::empty(view.size, view.eye));
         }
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));

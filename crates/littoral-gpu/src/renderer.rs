@@ -7,8 +7,9 @@ use crate::scenery::Scenery;
 use crate::times::PassTimes;
 use crate::triangles::Triangles;
 use crate::waves::{WavePass, Wet};
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use littoral::lod::Vertex;
+use littoral::picture::Medium;
 use littoral::space::View;
 
 /// Every shader with its name, as it is compiled: for tests that need no device.
@@ -371,7 +372,7 @@ impl Renderer {
     }
 
     /// Records the pass that shows what was drawn last on a target of some size (pixels), the drawn picture stretched over all of it. `grey` is the radiance (kcd/m²) that is shown
-    /// as middle grey.
+    /// as middle grey, where the picture has an exposure.
     pub fn show(
         &self,
         gpu: &Gpu,
@@ -384,8 +385,13 @@ impl Renderer {
         let Some(canvas) = &self.canvas else { return };
         let stretch = canvas.size.as_vec2() / size.max(UVec2::ONE).as_vec2();
         let encodes = if self.format.is_srgb() { 1.0 } else { 0.0 };
-        let scale = scenery.balance * (0.30 / grey.max(1e-9));
-        let shown = [scale.x, scale.y, scale.z, 0.0, encodes, stretch.x, stretch.y, 0.0];
+        let grey = grey.max(1e-9);
+        let (medium, scale) = match scenery.medium {
+            Medium::Photograph => (0.0, scenery.balance * (0.30 / grey)),
+            Medium::Model => (1.0, scenery.balance * (0.18 / grey)),
+            Medium::Paper => (2.0, Vec3::ONE),
+        };
+        let shown = [scale.x, scale.y, scale.z, medium, encodes, stretch.x, stretch.y, 0.0];
         gpu.queue.write_buffer(&self.shown, 0, bytemuck::cast_slice(&shown));
         let radiance = canvas.radiance.create_view(&Default::default());
         let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {

@@ -7,7 +7,7 @@ use crate::waves::Waves;
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
 use littoral::field::Sea;
-use littoral::picture::{Lattice, SkyTable, Slab, Tables};
+use littoral::picture::{Lattice, Medium, SkyTable, Slab, Tables};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{TextureDimension, TextureFormat};
 
@@ -21,6 +21,7 @@ pub struct Scenery {
     /// Tangent of the horizon's elevation towards the sun; height of trees and houses (m).
     pub(crate) horizon: wgpu::Texture,
     pub(crate) coat: GpuCoat,
+    pub(crate) medium: Medium,
     pub(crate) eye_light: wgpu::Texture,
     pub(crate) eye_through: wgpu::Texture,
     pub(crate) land_light: wgpu::Texture,
@@ -160,6 +161,7 @@ impl Scenery {
             known,
             horizon: make("horizon", TextureFormat::Rg16Float, map, bytemuck::cast_slice(&horizon)),
             coat: GpuCoat::new(gpu, &tables.coat),
+            medium: tables.medium,
             eye_light: volume("sky of the eye"),
             eye_through: make(
                 "air before the eye",
@@ -233,7 +235,7 @@ impl Scenery {
 
     /// Whether there is water that waves can be drawn on: on maps it is a colour.
     pub fn shows_waves(&self) -> bool {
-        self.level.is_some() && self.coat.kind != 1.0
+        self.level.is_some() && !self.coat.is_map()
     }
 
     /// Draws waves on the water from here on, or still water.

@@ -341,9 +341,10 @@ struct Frames {
 impl Frames {
     fn new(gpu: &Gpu, stage: &Stage) -> Result<Frames, Failure> {
         let failed = |e: &dyn std::fmt::Display| Failure::Work(e.to_string());
-        let (Some(tables), Datum::Plane { origin, size }) = (stage.tables(), stage.land().datum()) else {
-            return Err(Failure::Work("expected land on a plane in colours, got another".into()));
+        let Datum::Plane { origin, size } = stage.land().datum() else {
+            return Err(Failure::Work("expected land on a plane, got another".into()));
         };
+        let tables = stage.tables();
         let height = f64::from(stage.land().height_range().high).max(2.0);
         let scenery = Scenery::new(gpu, &tables, (origin, size), (height, &stage.sky_table(height)));
         let mut renderer = Renderer::new(gpu, wgpu::TextureFormat::Rgba8Unorm);

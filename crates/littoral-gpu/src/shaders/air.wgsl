@@ -61,8 +61,11 @@ fn veil(direction: vec3f, distance: f32) -> Veil {
     return Veil(scattered(eye_light, place, direction), max(through, vec3f(0.0)));
 }
 
-// Radiance of the sky as the eye sees it, with the sun's disc.
+// Radiance of the sky as the eye sees it, with the sun's disc; on paper there is none.
 fn sky_seen(direction: vec3f) -> vec3f {
+    if is_paper() {
+        return frame.mist.rgb;
+    }
     let seen = veil(direction, 1e9);
     let edge = cos(frame.sun.w);
     let inside = saturate((dot(direction, frame.sun.xyz) - edge) / (0.1 * (1.0 - edge)));

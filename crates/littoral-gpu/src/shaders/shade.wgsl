@@ -38,6 +38,10 @@ struct Ground {
 
 // Called from one place only: it is nearly all of the shader.
 fn ground_at(piece: Piece) -> Ground {
+    if is_paper() {
+        let reflectance = relief_at(piece.rel, piece.z, piece.footprint);
+        return Ground(Surface(), Material(reflectance, vec3f(0.0, 0.0, 1.0), 1.0, 0.0));
+    }
     let surface = surface_at(piece.rel, piece.footprint);
     if is_map() {
         return Ground(surface, coated(tint_at(piece.rel, piece.z), surface, piece.footprint, frame.tint.w));
@@ -63,6 +67,9 @@ fn ground_at(piece: Piece) -> Ground {
 // Light that a piece of ground throws back (kcd/m²), where the eye looks at it along `direction`.
 fn lit(piece: Piece, ground: Ground, direction: vec3f) -> vec3f {
     let material = ground.material;
+    if is_paper() {
+        return mix(frame.mist.rgb, material.albedo, known_at(piece.rel));
+    }
     let smooth_normal = normal_of_slope(ground.surface.slope);
     var light = material.albedo / PI * irradiance_at(piece.rel, material.normal) * material.openness;
     if material.wet > 0.0 {
