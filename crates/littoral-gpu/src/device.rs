@@ -118,9 +118,9 @@ impl Gpu {
         }
     }
 
-    /// Whether the adapter is a processor that does a GPU's work.
+    /// Whether the adapter is a processor that does a GPU's work. That of tests, which does none, is taken for a graphics card.
     pub fn is_software(&self) -> bool {
-        self.adapter.device_type == wgpu::DeviceType::Cpu
+        self.adapter.device_type == wgpu::DeviceType::Cpu && self.adapter.backend != wgpu::Backend::Noop
     }
 }
 
