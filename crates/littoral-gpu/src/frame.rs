@@ -6,6 +6,7 @@ use littoral::field::Finest;
 use littoral::picture::Streaks;
 use littoral::space::View;
 
+use crate::bindings;
 use crate::scenery::Scenery;
 
 /// One noise: from metres to its own coordinates, and where the eye is in those.
@@ -170,6 +171,11 @@ fn noises(spacing: f64, finest: Finest, time: f64) -> Vec<Sound> {
         ..even(wavelength, 1.0, 70 + i as u32)
     }));
     all
+}
+
+/// The layout of the group that says to every shader of a picture what the frame is: a uniform buffer of [`Uniforms`].
+pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    bindings::group_layout(device, "frame", wgpu::ShaderStages::VERTEX_FRAGMENT, [bindings::uniform(false)])
 }
 
 impl Uniforms {

@@ -9,6 +9,7 @@
 //!
 //! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
+mod bindings;
 mod coat;
 mod device;
 mod frame;

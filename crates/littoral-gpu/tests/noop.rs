@@ -33,7 +33,7 @@ fn sound(gpu: &Gpu, what: impl std::fmt::Display) {
 fn bay(columns: usize, rows: usize, voids: bool) -> Land {
     let height = |i: usize| {
         let (x, y) = ((i % columns) as f32 / columns as f32, (i / columns) as f32 / rows as f32);
-        if voids && i % 97 == 0 { f32::NAN } else { 40.0 * (9.0 * x).sin() + 60.0 * y - 30.0 }
+        if voids && i.is_multiple_of(97) { f32::NAN } else { 40.0 * (9.0 * x).sin() + 60.0 * y - 30.0 }
     };
     let heights = (0..columns * rows).map(height).collect();
     Land::new(Raster::new(columns, rows, DVec2::new(20.0, 25.0), heights).expect("a raster"))

@@ -30,7 +30,7 @@ fn films_prints_and_papers_are_shown_as_the_processor_shows_them() {
         Ok(gpu) => gpu,
         Err(e) => return eprintln!("not tested: {e}"),
     };
-    let side = 128;
+    let side = 64;
     let size = UVec2::splat(side);
     let land = coast::coast();
     let water = Water::flood(&land, 0.0);

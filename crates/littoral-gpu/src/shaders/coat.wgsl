@@ -1,7 +1,7 @@
 // What the ground is seen as where it is not nature: the engine's `picture::cartography`, and pictures laid over it.
 
 // Colours of tints, land and bed; or the picture. Nothing of a shaded relief.
-@group(0) @binding(4) var coat_map: texture_2d<f32>;
+@group(1) @binding(3) var coat_map: texture_2d<f32>;
 
 fn is_map() -> bool {
     return frame.coat.x == 1.0 || is_paper();

@@ -1,9 +1,9 @@
 // Every pixel lit once: from how far away things are to the light they send. The engine's `picture::shade`.
 
-@group(0) @binding(15) var depth_map: texture_depth_2d;
+@group(2) @binding(0) var depth_map: texture_depth_2d;
 // As far as the sea is, and what its waves are like there: see wave_seen.wgsl.
-@group(0) @binding(18) var sea_depth_map: texture_depth_2d;
-@group(0) @binding(19) var sea_map: texture_2d<u32>;
+@group(2) @binding(1) var sea_depth_map: texture_depth_2d;
+@group(2) @binding(2) var sea_map: texture_2d<u32>;
 
 @vertex
 fn everywhere(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
