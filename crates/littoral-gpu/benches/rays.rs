@@ -11,7 +11,7 @@ use littoral::field::{HeightField, Land, Raster};
 use littoral::picture::{Scene, Stage};
 use littoral::raycast::LocalRay;
 use littoral::space::{Datum, View};
-use littoral_gpu::{Gpu, Ground, Look, PassTimes, Renderer, Scenery, ShapeTexture};
+use littoral_gpu::{Gpu, Ground, Look, Renderer, Scenery, ShapeTexture};
 use std::time::Instant;
 
 /// Side of the map (m).
@@ -21,7 +21,7 @@ const RUNS: usize = 15;
 
 fn main() {
     let gpu = match Gpu::headless() {
-        Ok(gpu) => gpu,
+        Ok(gpu) => gpu.timed(),
         Err(error) => return println!("{error}"),
     };
     let (size, sides) = match gpu.is_software() {
@@ -64,17 +64,16 @@ fn map(gpu: &Gpu, side: usize, size: UVec2) {
     let sky = stage.sky_table(eye.z);
     let scenery = Scenery::new(gpu, &tables, (origin, extent), (eye.z, &sky)).expect("a map that fits");
     let mut renderer = Renderer::new(gpu, wgpu::TextureFormat::Rgba8Unorm);
-    renderer.times = PassTimes::new(gpu);
     for (name, pixels) in [("exact", 0.0), ("by cones of a pixel", 1.0)] {
         let (wall, pass) = median(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let ground = Ground::Rays { shape: &shape, pixels };
             renderer.distances(gpu, &mut encoder, &scenery, ground, &view, Look::default());
-            let times = renderer.times.as_ref();
+            let times = gpu.times.as_ref();
             times.inspect(|times| times.keep(&mut encoder));
             gpu.queue.submit([encoder.finish()]);
             wait();
-            times.map_or(0.0, |times| times.read(gpu).map_or(0.0, |passes| passes[0]))
+            times.map_or(0.0, |times| times.read(gpu).map_or(0.0, |passes| passes.into_iter().flatten().sum()))
         });
         let rays = f64::from(size.x * size.y);
         let bytes = 4.0 * (samples.min(4.0 * rays) + rays);

@@ -25,7 +25,7 @@ const ROW: u32 = 16;
 
 fn main() {
     let gpu = match Gpu::headless() {
-        Ok(gpu) => gpu,
+        Ok(gpu) => gpu.timed(),
         Err(error) => return println!("{error}"),
     };
     println!("{} ({:?})", gpu.adapter.name, gpu.adapter.backend);
@@ -51,12 +51,12 @@ fn main() {
         select();
         let processor = clock::median(5, select);
 
-        let timer = Timer::new(&gpu);
         let mut times = [const { Vec::new() }; 3];
         for frame in 0..FRAMES + 4 {
-            let alone = submit(&gpu, &mut tessellator, &view, 1, timer.as_ref());
-            let ticks = timer.as_ref().map_or(0.0, |timer| timer.read(&gpu));
-            let in_a_row = submit(&gpu, &mut tessellator, &view, ROW, None) / f64::from(ROW);
+            let alone = submit(&gpu, &mut tessellator, &view, 1);
+            let ticks = gpu.times.as_ref().and_then(|times| times.read(&gpu).ok());
+            let ticks = ticks.map_or(0.0, |passes| passes.into_iter().flatten().sum());
+            let in_a_row = submit(&gpu, &mut tessellator, &view, ROW) / f64::from(ROW);
             if frame >= 4 {
                 times.iter_mut().zip([alone, in_a_row, ticks]).for_each(|(times, taken)| times.push(taken));
             }
@@ -78,7 +78,7 @@ fn main() {
             drawing.triangles(),
             told.cells,
         );
-        let clock = if timer.is_some() { format!("{ticks:.3} ms by its clock") } else { "no clock".to_owned() };
+        let clock = if gpu.times.is_some() { format!("{ticks:.3} ms by its clock") } else { "no clock".to_owned() };
         println!(
             "  {alone:.3} ms alone, {in_a_row:.3} ms in a row, {clock}; on the processor {:.3} ms; {:.2} MB at least: {:.1} GB/s in a row",
             processor * 1e3,
@@ -92,69 +92,18 @@ fn wait(gpu: &Gpu) {
     drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
 }
 
-/// Milliseconds from before a number of tessellations are submitted until they are done.
-fn submit(gpu: &Gpu, tessellator: &mut Tessellator, view: &View, number: u32, timer: Option<&Timer>) -> f64 {
+/// Milliseconds from before a number of tessellations are submitted until they are done. One alone leaves its time by the device's clock, too.
+fn submit(gpu: &Gpu, tessellator: &mut Tessellator, view: &View, number: u32) -> f64 {
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let times = gpu.times.as_ref().filter(|_| number == 1);
     for _ in 0..number {
-        let refused = tessellator.tessellate(gpu, &mut encoder, view, timer.map(Timer::writes));
-        refused.expect("a view that the processor took");
+        let timestamps = times.and_then(|times| times.of_compute("tessellation"));
+        tessellator.tessellate(gpu, &mut encoder, view, timestamps).expect("a view that the processor took");
     }
+    times.inspect(|times| times.keep(&mut encoder));
     let commands = encoder.finish();
     let start = Instant::now();
     gpu.queue.submit([commands]);
     wait(gpu);
     start.elapsed().as_secs_f64() * 1e3
-}
-
-/// The device's own clock.
-struct Timer {
-    queries: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-    read: wgpu::Buffer,
-}
-
-impl Timer {
-    fn new(gpu: &Gpu) -> Option<Timer> {
-        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return None;
-        }
-        let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-            label: Some("timer"),
-            ty: wgpu::QueryType::Timestamp,
-            count: 2,
-        });
-        let buffer = |usage| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("timer"),
-                size: 16,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        use wgpu::BufferUsages as Usage;
-        let resolved = buffer(Usage::QUERY_RESOLVE | Usage::COPY_SRC);
-        Some(Timer { queries, resolved, read: buffer(Usage::COPY_DST | Usage::MAP_READ) })
-    }
-
-    fn writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
-        wgpu::ComputePassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        }
-    }
-
-    /// Milliseconds of the pass that it was given to last.
-    fn read(&self, gpu: &Gpu) -> f64 {
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.resolve_query_set(&self.queries, 0..2, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.read, 0, 16);
-        gpu.queue.submit([encoder.finish()]);
-        self.read.map_async(wgpu::MapMode::Read, .., |_| {});
-        wait(gpu);
-        let ticks =
-            self.read.get_mapped_range(..).map_or([0; 2], |bytes| bytemuck::pod_read_unaligned::<[u64; 2]>(&bytes));
-        self.read.unmap();
-        ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(gpu.queue.get_timestamp_period()) * 1e-6
-    }
 }

@@ -5,7 +5,6 @@ use crate::device::{Gpu, GpuError};
 use crate::frame::{self, Look, Uniforms};
 use crate::rays::ShapeTexture;
 use crate::scenery::{self, Scenery};
-use crate::times::PassTimes;
 use crate::triangles::Triangles;
 use crate::waves::{self, WavePass, Wet};
 use glam::{UVec2, Vec3};
@@ -80,8 +79,6 @@ pub struct Renderer {
     frame: wgpu::BindGroup,
     shown: wgpu::Buffer,
     canvas: Option<Canvas>,
-    /// Where pictures leave how long their passes took.
-    pub times: Option<PassTimes>,
     /// Made when the first waves are drawn.
     waves: Option<WavePass>,
 }
@@ -205,7 +202,6 @@ impl Renderer {
             frame,
             shown: uniform("shown", 32),
             canvas: None,
-            times: None,
             waves: None,
         }
     }
@@ -237,7 +233,7 @@ impl Renderer {
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             }),
-            timestamp_writes: self.times.as_ref().and_then(|times| times.of("surface")),
+            timestamp_writes: gpu.render_times("surface"),
             ..Default::default()
         });
         match ground {
@@ -267,7 +263,7 @@ impl Renderer {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shade"),
             color_attachments: &[Some(onto(&canvas.light, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
-            timestamp_writes: self.times.as_ref().and_then(|times| times.of("shade")),
+            timestamp_writes: gpu.render_times("shade"),
             ..Default::default()
         });
         pass.set_pipeline(&self.shade);

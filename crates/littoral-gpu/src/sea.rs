@@ -212,8 +212,10 @@ impl GpuSea {
             }
             self.gpu.queue.write_buffer(&self.moments, 0, &bytes);
             {
-                let mut pass = encoder
-                    .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("sea"), timestamp_writes: None });
+                // Ticks of foam after a leap in time take submissions of their own, and are not told.
+                let timestamp_writes = if last { self.gpu.compute_times("sea") } else { None };
+                let mut pass =
+                    encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("sea"), timestamp_writes });
                 (0..some.len()).for_each(|tick| self.sum(&mut pass, tick, true));
                 if last {
                     self.sum(&mut pass, some.len(), false);

@@ -305,7 +305,7 @@ impl WavePass {
                 self.bind(gpu, uniforms, ground);
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("wave points"),
-                    timestamp_writes: None,
+                    timestamp_writes: gpu.compute_times("wave points"),
                 });
                 pass.set_pipeline(&self.move_points);
                 let own = self.bound.as_ref().map(|bound| &bound.moving);
@@ -333,6 +333,7 @@ impl WavePass {
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             }),
+            timestamp_writes: gpu.render_times("waves"),
             ..Default::default()
         });
         if size[1] < 2 {

@@ -11,8 +11,8 @@ use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::{SeaState, Sines, StillWater};
 use littoral_gpu::sea::Transform;
 use littoral_gpu::{
-    Gpu, GpuSea, Ground, Look, Painter, PainterError, Renderer, Scenery, ShapeTexture, Tessellator, Triangles, Waves,
-    WavesError,
+    Gpu, GpuSea, Ground, Look, Painter, PainterError, PassTimes, Renderer, Scenery, ShapeTexture, Tessellator,
+    Triangles, Waves, WavesError,
 };
 
 /// A device that does nothing but check what it is asked for.
@@ -258,4 +258,41 @@ fn rays_are_asked_in_parts() {
         assert_eq!(triangles.len(), count as usize);
         sound(&gpu, format!("{count} triangles"));
     }
+}
+
+#[test]
+fn passes_that_were_recorded_are_timed() {
+    let gpu = gpu().timed();
+    let land = bay(65, 49, false);
+    let water = Water::flood(&land, 0.0).expect("a sea");
+    let stage = Stage::new(&Scene::new(&land, Some(&water)));
+    let mut scenery = scenery(&gpu, &stage);
+    let mut renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
+    let mut patches =
+        Tessellator::new(&gpu, stage.land(), Limits { finest: 30, triangles: 500 }).expect("a small land");
+    let view = view(&land, UVec2::new(64, 36));
+    let times = gpu.times.as_ref().expect("a clock");
+    let mut draw = |scenery: &Scenery, tessellates: bool| {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        if tessellates {
+            let timestamps = times.of_compute("tessellation");
+            patches.tessellate(&gpu, &mut encoder, &view, timestamps).expect("a view");
+        }
+        let ground = Ground::Triangles(patches.triangles());
+        renderer.draw(&gpu, &mut encoder, scenery, ground, &view, Look::default());
+        times.keep(&mut encoder);
+        gpu.queue.submit([encoder.finish()]);
+        let told = times.read(&gpu).expect("a device");
+        sound(&gpu, "times");
+        let timed = PassTimes::PASSES.into_iter().zip(told).filter(|(_, time)| time.is_some());
+        timed.map(|(pass, _)| pass).collect::<Vec<_>>()
+    };
+    assert_eq!(draw(&scenery, false), ["surface", "shade"]);
+    assert_eq!(draw(&scenery, true), ["tessellation", "surface", "shade"]);
+    let state = SeaState::beaufort(6.0, 0.6).expect("a state");
+    let sea = Sea::over(&land, &water, &state, &|_| true).expect("a sea");
+    scenery.set_waves(Waves::new(&gpu, &sea).expect("known waves"));
+    assert_eq!(draw(&scenery, true), PassTimes::PASSES);
+    // The same view of the same instant: sums and points stand.
+    assert_eq!(draw(&scenery, false), ["surface", "waves", "shade"]);
 }
