@@ -15,7 +15,7 @@ mod globe;
 
 use littoral::lod::{Drawing, Limits, Lod, Patches};
 use littoral::space::View;
-use littoral_gpu::{Gpu, Tessellator};
+use littoral_gpu::{Gpu, TessellationPasses, Tessellator};
 use std::time::Instant;
 
 /// Frames that are measured, after a few that warm up.
@@ -34,12 +34,13 @@ fn main() {
     let columns = columns.next_power_of_two().clamp(1024, globe::COLUMNS);
     let land = globe::land(columns);
     let all = land.finest_level();
+    let passes = TessellationPasses::new(&gpu);
     println!("{columns} × {} samples", columns / 2);
     for (finest, tolerance) in [(all - 3, 1.0), (all, 1.0), (all, 0.25), (all, 0.02)] {
         let limits = Limits { finest, triangles: 1_000_000 };
         let view = globe::view(tolerance);
         let start = Instant::now();
-        let mut tessellator = match Tessellator::new(&gpu, &land, limits) {
+        let mut tessellator = match Tessellator::new(&gpu, &passes, &land, limits) {
             Ok(tessellator) => tessellator,
             Err(error) => return println!("{error}"),
         };

@@ -5,7 +5,7 @@ use crate::frame::Look;
 use crate::rays::{ShapeError, ShapeTexture};
 use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
-use crate::tessellator::{Tessellated, Tessellator};
+use crate::tessellator::{Tessellated, TessellationPasses, Tessellator};
 use crate::triangles::{TooMany, Triangles};
 use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
@@ -22,6 +22,8 @@ pub struct Painter {
     scenery: Scenery,
     triangles: Triangles,
     shape: Option<ShapeTexture>,
+    /// Made when the first land is tessellated.
+    tessellation: Option<TessellationPasses>,
     /// What was tessellated last, and the limits that were asked for.
     patches: Option<(Limits, Tessellator)>,
     white: [f32; 3],
@@ -95,6 +97,7 @@ impl Painter {
             scenery,
             triangles: Triangles::default(),
             shape: None,
+            tessellation: None,
             patches: None,
             white: tables.white,
             medium: tables.medium,
@@ -145,7 +148,10 @@ impl Painter {
     pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
         let patches = match self.patches.take() {
             Some(patches) if patches.0 == limits => patches,
-            _ => (limits, Tessellator::new(&self.gpu, land, limits)?),
+            _ => {
+                let passes = self.tessellation.get_or_insert_with(|| TessellationPasses::new(&self.gpu));
+                (limits, Tessellator::new(&self.gpu, passes, land, limits)?)
+            }
         };
         let (_, patches) = self.patches.insert(patches);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());

@@ -11,8 +11,8 @@ use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::{SeaState, Sines, StillWater};
 use littoral_gpu::sea::Transform;
 use littoral_gpu::{
-    Gpu, GpuSea, Ground, Look, Painter, PainterError, PassTimes, Renderer, Scenery, ShapeTexture, Tessellator,
-    Triangles, Waves, WavesError,
+    Gpu, GpuSea, Ground, Look, Painter, PainterError, PassTimes, Renderer, Scenery, ShapeTexture, TessellationPasses,
+    Tessellator, Triangles, Waves, WavesError,
 };
 
 /// A device that does nothing but check what it is asked for.
@@ -93,6 +93,7 @@ fn what_is_wrong_is_told_without_an_adapter() {
 #[test]
 fn pictures_of_every_kind_and_size_are_recorded() {
     let gpu = gpu();
+    let passes = TessellationPasses::new(&gpu);
     let land = bay(65, 49, false);
     let holes = bay(33, 40, true);
     let texels: Vec<[u8; 3]> = (0..300u32 * 170).map(|i| [i as u8, (i >> 3) as u8, 90]).collect();
@@ -115,8 +116,8 @@ fn pictures_of_every_kind_and_size_are_recorded() {
             let stage = Stage::new(&Scene { style, border, drape: Some(&drape), ..Scene::new(land, wet) });
             let mut scenery = scenery(&gpu, &stage);
             let shape = ShapeTexture::new(&gpu, stage.land()).expect("a small land");
-            let mut patches =
-                Tessellator::new(&gpu, stage.land(), Limits { finest: 30, triangles: 5000 }).expect("a small land");
+            let mut patches = Tessellator::new(&gpu, &passes, stage.land(), Limits { finest: 30, triangles: 5000 })
+                .expect("a small land");
             for size in [UVec2::new(64, 36), UVec2::ONE, UVec2::new(3, 200), UVec2::ZERO, UVec2::new(64, 36)] {
                 let view = view(land, size);
                 let mut triangles = Triangles::default();
@@ -218,6 +219,7 @@ fn seas_are_summed_in_both_ways() {
 #[test]
 fn lands_of_every_size_are_brought_or_refused() {
     let gpu = gpu();
+    let passes = TessellationPasses::new(&gpu);
     for (columns, rows) in [(2, 2), (3, 2), (2, 300), (8192, 2), (8193, 2), (2, 9000)] {
         let land = bay(columns, rows, false);
         let fits = columns.max(rows) <= 8192;
@@ -225,7 +227,7 @@ fn lands_of_every_size_are_brought_or_refused() {
         let painter = Painter::new(gpu.clone(), &stage);
         assert_eq!(painter.is_ok(), fits, "{columns} × {rows}");
         assert_eq!(ShapeTexture::new(&gpu, &land).is_ok(), fits);
-        assert_eq!(Tessellator::new(&gpu, &land, Limits { finest: 30, triangles: 100 }).is_ok(), fits);
+        assert_eq!(Tessellator::new(&gpu, &passes, &land, Limits { finest: 30, triangles: 100 }).is_ok(), fits);
         sound(&gpu, format!("{columns} × {rows}"));
         let Ok(mut painter) = painter else { continue };
         for size in [UVec2::ZERO, UVec2::ONE, UVec2::new(5, 4)] {
@@ -269,7 +271,8 @@ fn passes_that_were_recorded_are_timed() {
     let mut scenery = scenery(&gpu, &stage);
     let mut renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
     let mut patches =
-        Tessellator::new(&gpu, stage.land(), Limits { finest: 30, triangles: 500 }).expect("a small land");
+        Tessellator::new(&gpu, &TessellationPasses::new(&gpu), stage.land(), Limits { finest: 30, triangles: 500 })
+            .expect("a small land");
     let view = view(&land, UVec2::new(64, 36));
     let times = gpu.times.as_ref().expect("a clock");
     let mut draw = |scenery: &Scenery, tessellates: bool| {
