@@ -70,14 +70,15 @@ fn main() {
             Ok(told) => told,
             Err(error) => return println!("{error}"),
         };
-        let bytes = 8 * u64::from(told.cells) + (16 + 4) * u64::from(told.vertices) + 12 * u64::from(told.triangles);
+        let bytes =
+            8 * u64::from(told.looked_at) + (16 + 4) * u64::from(told.vertices) + 12 * u64::from(told.triangles);
         println!(
             "down to level {finest}, {tolerance} pixels asked, {:.2} reached: {} -> {} triangles ({} on the processor), {} cells looked at; made ready in {made:.1} s",
             told.reached.pixels,
             2u64 << (2 * finest - 1),
             told.triangles,
             drawing.triangles(),
-            told.cells,
+            told.looked_at,
         );
         let clock = if gpu.times.is_some() { format!("{ticks:.3} ms by its clock") } else { "no clock".to_owned() };
         println!(

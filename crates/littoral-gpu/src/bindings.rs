@@ -32,41 +32,36 @@ pub fn depths() -> BindingType {
 }
 
 /// A texture of whole numbers.
-pub fn numbers() -> BindingType {
+pub const fn numbers() -> BindingType {
     texture(TextureSampleType::Uint, TextureViewDimension::D2)
 }
 
-fn texture(sample_type: TextureSampleType, view_dimension: TextureViewDimension) -> BindingType {
+const fn texture(sample_type: TextureSampleType, view_dimension: TextureViewDimension) -> BindingType {
     BindingType::Texture { sample_type, view_dimension, multisampled: false }
 }
 
 /// The layout of a group of these types.
-pub fn group_layout<const N: usize>(
+pub fn group_layout(
     device: &wgpu::Device,
     label: &str,
     visibility: wgpu::ShaderStages,
-    types: [BindingType; N],
+    types: &[BindingType],
 ) -> wgpu::BindGroupLayout {
-    let mut binding = 0..;
-    let entries = types.map(|ty| wgpu::BindGroupLayoutEntry {
-        binding: binding.next().unwrap_or_default(),
-        visibility,
-        ty,
-        count: None,
-    });
+    let entry =
+        |(binding, &ty): (u32, &BindingType)| wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None };
+    let entries: Vec<_> = (0..).zip(types).map(entry).collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
 /// A group of a layout.
-pub fn group<const N: usize>(
+pub fn group<'a>(
     device: &wgpu::Device,
     label: &str,
     layout: &wgpu::BindGroupLayout,
-    resources: [wgpu::BindingResource; N],
+    resources: impl IntoIterator<Item = wgpu::BindingResource<'a>>,
 ) -> wgpu::BindGroup {
-    let mut binding = 0..;
-    let entries =
-        resources.map(|resource| wgpu::BindGroupEntry { binding: binding.next().unwrap_or_default(), resource });
+    let entries = (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
+    let entries: Vec<_> = entries.collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }
 

@@ -175,7 +175,7 @@ fn noises(spacing: f64, finest: Finest, time: f64) -> Vec<Sound> {
 
 /// The layout of the group that says to every shader of a picture what the frame is: a uniform buffer of [`Uniforms`].
 pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    bindings::group_layout(device, "frame", wgpu::ShaderStages::VERTEX_FRAGMENT, [bindings::uniform(false)])
+    bindings::group_layout(device, "frame", wgpu::ShaderStages::VERTEX_FRAGMENT, &[bindings::uniform(false)])
 }
 
 impl Uniforms {

@@ -10,8 +10,11 @@
 //! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
 mod bindings;
+mod bisector;
 mod coat;
+mod compute;
 mod device;
+mod expander;
 mod frame;
 mod painter;
 pub mod rays;
@@ -24,7 +27,9 @@ mod times;
 mod triangles;
 mod waves;
 
+pub use bisector::{BISECTION_SHADERS, Bisector};
 pub use device::{Gpu, GpuError};
+pub use expander::{EXPANSION_SHADER, Expander};
 pub use frame::Look;
 pub use painter::{Painter, PainterError};
 pub use rays::{ShapeError, ShapeTexture};

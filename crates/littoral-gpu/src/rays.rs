@@ -393,7 +393,7 @@ fn cast_pipeline(device: &wgpu::Device, module: &wgpu::ShaderModule) -> wgpu::Re
         device,
         "shape",
         wgpu::ShaderStages::FRAGMENT,
-        [bindings::uniform(false), bindings::texels(wgpu::TextureViewDimension::D2), bindings::storage(true)],
+        &[bindings::uniform(false), bindings::texels(wgpu::TextureViewDimension::D2), bindings::storage(true)],
     );
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("cast"),

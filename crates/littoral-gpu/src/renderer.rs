@@ -434,13 +434,13 @@ fn distances(gpu: &Gpu, depth: &wgpu::TextureView, wet: &Wet) -> wgpu::BindGroup
 
 fn distances_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let types = [bindings::depths(), bindings::depths(), bindings::numbers()];
-    bindings::group_layout(device, "distances", wgpu::ShaderStages::FRAGMENT, types)
+    bindings::group_layout(device, "distances", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
 /// The light of a picture, and how it is shown.
 fn shown_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let types = [bindings::texels(wgpu::TextureViewDimension::D2), bindings::uniform(false)];
-    bindings::group_layout(device, "display", wgpu::ShaderStages::FRAGMENT, types)
+    bindings::group_layout(device, "display", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
 /// A texture of a size (pixels, at least one each way) that passes draw and shaders read.

@@ -269,7 +269,7 @@ pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         texels,
         wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
     ];
-    bindings::group_layout(device, "scenery", wgpu::ShaderStages::FRAGMENT, types)
+    bindings::group_layout(device, "scenery", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
 fn group(device: &wgpu::Device, textures: [&wgpu::Texture; 12]) -> wgpu::BindGroup {
@@ -281,9 +281,8 @@ fn group(device: &wgpu::Device, textures: [&wgpu::Texture; 12]) -> wgpu::BindGro
         mipmap_filter: wgpu::MipmapFilterMode::Linear,
         ..Default::default()
     });
-    let [a, b, c, d, e, f, g, h, i, j, k, l] = views.each_ref().map(wgpu::BindingResource::TextureView);
-    let sampler = wgpu::BindingResource::Sampler(&sampler);
-    bindings::group(device, "scenery", &layout(device), [a, b, c, d, e, f, g, h, i, j, k, l, sampler])
+    let views = views.iter().map(wgpu::BindingResource::TextureView);
+    bindings::group(device, "scenery", &layout(device), views.chain([wgpu::BindingResource::Sampler(&sampler)]))
 }
 
 /// Light of the sky: azimuths are slices, one after the other for each kind of scattering.

@@ -374,7 +374,7 @@ impl Caps {
             device,
             "sea",
             wgpu::ShaderStages::COMPUTE,
-            [
+            &[
                 bindings::uniform(false),
                 bindings::storage(true),
                 bindings::texels(wgpu::TextureViewDimension::D2Array),
@@ -488,7 +488,7 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         stored(wgpu::TextureFormat::Rgba32Float),
         write,
     ];
-    bindings::group_layout(device, "sea", wgpu::ShaderStages::COMPUTE, types)
+    bindings::group_layout(device, "sea", wgpu::ShaderStages::COMPUTE, &types)
 }
 
 /// The source of a transform.

@@ -169,7 +169,7 @@ pub(crate) fn run_up(gpu: &Gpu, [columns, rows]: [u32; 2], reach: &[f32]) -> wgp
 /// The layout of that group.
 pub(crate) fn run_up_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let map = bindings::texels(wgpu::TextureViewDimension::D2);
-    bindings::group_layout(device, "run-up", wgpu::ShaderStages::FRAGMENT, [map])
+    bindings::group_layout(device, "run-up", wgpu::ShaderStages::FRAGMENT, &[map])
 }
 
 /// What is known of the sea in each pixel of a canvas.
@@ -379,11 +379,10 @@ impl WavePass {
             return;
         }
         let device = &gpu.device;
-        let [a, b, c, d] = [uniforms, &self.grid, radii, points].map(wgpu::Buffer::as_entire_binding);
-        let [e, f, g, h] = [uniforms, &self.grid, radii, points].map(wgpu::Buffer::as_entire_binding);
+        let own = || [uniforms, &self.grid, radii, points].map(wgpu::Buffer::as_entire_binding);
         let ground = wgpu::BindingResource::TextureView(ground);
-        let moving = bindings::group(device, "wave points", &moving_layout(device), [a, b, c, d]);
-        let seeing = bindings::group(device, "waves seen", &seeing_layout(device), [e, f, g, h, ground]);
+        let moving = bindings::group(device, "wave points", &moving_layout(device), own());
+        let seeing = bindings::group(device, "waves seen", &seeing_layout(device), own().into_iter().chain([ground]));
         self.bound = Some(Bound { of, moving, seeing });
     }
 }
@@ -392,14 +391,14 @@ impl WavePass {
 fn moving_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let (uniform, storage) = (bindings::uniform(false), bindings::storage);
     let types = [uniform, uniform, storage(true), storage(false)];
-    bindings::group_layout(device, "wave points", wgpu::ShaderStages::COMPUTE, types)
+    bindings::group_layout(device, "wave points", wgpu::ShaderStages::COMPUTE, &types)
 }
 
 /// Frame, grid, radii and points to be drawn, and how far away the ground is.
 fn seeing_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let (uniform, read) = (bindings::uniform(false), bindings::storage(true));
     let types = [uniform, uniform, read, read, bindings::depths()];
-    bindings::group_layout(device, "waves seen", wgpu::ShaderStages::VERTEX_FRAGMENT, types)
+    bindings::group_layout(device, "waves seen", wgpu::ShaderStages::VERTEX_FRAGMENT, &types)
 }
 
 #[cfg(test)]
@@ -431,7 +430,7 @@ mod tests {
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
         let types = [bindings::storage(true), bindings::storage(false)];
-        let own = bindings::group_layout(device, "asked", wgpu::ShaderStages::COMPUTE, types);
+        let own = bindings::group_layout(device, "asked", wgpu::ShaderStages::COMPUTE, &types);
         let (tiles, shore) = (sea::sample::layout(device), sea::shore::layout(device));
         let layout = bindings::pipeline_layout(device, "asked", &[&tiles, &shore, &own]);
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

@@ -3,7 +3,7 @@
 
 use glam::{DAffine2, DVec2, DVec3, UVec2, Vec3};
 use littoral::field::{HeightField, Land, Raster, Sea, Water};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, Patches, Vertex};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Patches, Vertex};
 use littoral::picture::{Border, Drape, Scene, Stage, Style, Texture};
 use littoral::raycast::LocalRay;
 use littoral::space::{Datum, View};
@@ -233,6 +233,27 @@ fn lands_of_every_size_are_brought_or_refused() {
         for size in [UVec2::ZERO, UVec2::ONE, UVec2::new(5, 4)] {
             let picture = painter.picture(&stage, None, &view(&land, size), 2, &|_| {}).expect("a picture");
             assert_eq!(picture.radiance.len() as u32, size.element_product());
+        }
+        // Triangles made on the device, by every way that there is.
+        let bounds = NestedBounds::of(&land).expect("few samples");
+        let (limits, seen) = (Limits { finest: 30, triangles: 1000 }, view(&land, UVec2::new(64, 36)));
+        let small = view(&land, UVec2::new(5, 4));
+        let mut pictured = |painter: &mut Painter| {
+            let picture = painter.picture_of_made(&stage, &small, 1, &|_| {}).expect("a picture");
+            assert_eq!(picture.radiance.len(), 20);
+        };
+        painter.tessellate(&land, limits, &seen).expect("a view");
+        pictured(&mut painter);
+        for _ in 0..2 {
+            painter.bisect(&bounds, limits, &seen).expect("a view");
+            pictured(&mut painter);
+        }
+        for method in Method::ALL {
+            let mut drawing = Drawing::default();
+            method.within(limits).select(&land, &seen, &mut drawing).expect("a view");
+            painter.expand(&land, &mut drawing).expect("few triangles");
+            pictured(&mut painter);
+            sound(&gpu, format!("{method} of {columns} × {rows}"));
         }
         let wide = painter.picture(&stage, None, &view(&land, UVec2::new(8193, 1)), 1, &|_| {});
         assert!(matches!(wide, Err(PainterError::Picture { .. })));

@@ -80,5 +80,5 @@ pub fn place(origin: DVec2, tiles: &[Tile], into: &mut [SampleTile]) {
 pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let texels = bindings::texels(wgpu::TextureViewDimension::D2Array);
     let stages = wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE;
-    bindings::group_layout(device, "sea", stages, [bindings::storage(true), texels, texels])
+    bindings::group_layout(device, "sea", stages, &[bindings::storage(true), texels, texels])
 }

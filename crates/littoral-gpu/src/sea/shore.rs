@@ -133,5 +133,5 @@ impl GpuShore {
 pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let stages = wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE;
     let read = bindings::storage(true);
-    bindings::group_layout(device, "shore", stages, [bindings::uniform(false), read, read, read, read])
+    bindings::group_layout(device, "shore", stages, &[bindings::uniform(false), read, read, read, read])
 }

@@ -23,10 +23,10 @@ impl TessellationPasses {
     pub fn new(gpu: &Gpu) -> TessellationPasses {
         let device = &gpu.device;
         let (uniform, write, texels) = (bindings::uniform(false), bindings::storage(false), bindings::numbers());
-        let level = layout(device, [uniform, uniform, texels, texels, write, write, write, write, write]);
-        let turn = layout(device, [write]);
+        let level = layout(device, &[uniform, uniform, texels, texels, write, write, write, write, write]);
+        let turn = layout(device, &[write]);
         let drawing =
-            layout(device, [uniform, uniform, texels, texels, write, write, write, write, write, write, write]);
+            layout(device, &[uniform, uniform, texels, texels, write, write, write, write, write, write, write]);
         let [levels, draw] = TESSELLATION_SHADERS.map(|(label, source)| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(label),
@@ -56,6 +56,6 @@ impl TessellationPasses {
     }
 }
 
-fn layout<const N: usize>(device: &wgpu::Device, types: [wgpu::BindingType; N]) -> wgpu::BindGroupLayout {
+fn layout(device: &wgpu::Device, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
     bindings::group_layout(device, "tessellation", wgpu::ShaderStages::COMPUTE, types)
 }
