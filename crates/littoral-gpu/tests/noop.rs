@@ -238,7 +238,7 @@ fn lands_of_every_size_are_brought_or_refused() {
         let bounds = NestedBounds::of(&land).expect("few samples");
         let (limits, seen) = (Limits { finest: 30, triangles: 1000 }, view(&land, UVec2::new(64, 36)));
         let small = view(&land, UVec2::new(5, 4));
-        let mut pictured = |painter: &mut Painter| {
+        let pictured = |painter: &mut Painter| {
             let picture = painter.picture_of_made(&stage, &small, 1, &|_| {}).expect("a picture");
             assert_eq!(picture.radiance.len(), 20);
         };
