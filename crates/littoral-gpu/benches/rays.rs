@@ -5,6 +5,8 @@
 //! and what the adapter's own clock says where it has one; medians. The bytes are what must be moved at least: each sample read once, each pixel's depth
 //! written, and for the pyramid each node written and read once. Over the time and the memory's speed they are the part of what is possible.
 
+mod timer;
+
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::noise::Fbm;
 use littoral::field::{HeightField, Land, Raster};
@@ -47,7 +49,7 @@ fn map(gpu: &Gpu, side: usize, size: UVec2) {
     let samples = (side * side) as f64;
     println!("map of {side} × {side}");
 
-    let wait = || drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
+    let wait = || timer::wait(gpu);
     let built = median(|| {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         shape.build(&mut encoder);
@@ -69,11 +71,9 @@ fn map(gpu: &Gpu, side: usize, size: UVec2) {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let ground = Ground::Rays { shape: &shape, pixels };
             renderer.distances(gpu, &mut encoder, &scenery, ground, &view, Look::default());
-            let times = gpu.times.as_ref();
-            times.inspect(|times| times.keep(&mut encoder));
             gpu.queue.submit([encoder.finish()]);
             wait();
-            times.map_or(0.0, |times| times.read(gpu).map_or(0.0, |passes| passes.into_iter().flatten().sum()))
+            timer::read(gpu).unwrap_or(0.0)
         });
         let rays = f64::from(size.x * size.y);
         let bytes = 4.0 * (samples.min(4.0 * rays) + rays);

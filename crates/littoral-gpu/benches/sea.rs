@@ -4,6 +4,8 @@
 //! (those it makes here too); wall time from before the work is submitted until it is done; medians; both alternate within one process.
 //! The bytes are what the passes read and write as they are built: over the time and the memory's speed they are the part of what is possible.
 
+mod timer;
+
 use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::{Motion, Points, SeaState, WaveModel};
 use littoral_gpu::sea::Transform;
@@ -40,7 +42,7 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
     let mut sea = Cascades::with_tiles(&state, &tiles, &options).expect("a sea");
     let mut on_gpu =
         [Transform::Passes, Transform::Lines].map(|of| GpuSea::with_transform(gpu, &sea, of).expect("a sea"));
-    let wait = || drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
+    let wait = || timer::wait(gpu);
     wait();
     let mut times = [const { Vec::new() }; 8];
     // The first frames warm up. A tick of foam comes every 15 frames.
@@ -52,7 +54,7 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
                 sea.set_time(now);
                 wait();
             });
-            taken[6 + number] = by_its_clock(gpu);
+            taken[6 + number] = timer::read(gpu).unwrap_or(0.0);
         }
         // Until the next is submitted the processor is free.
         taken[2] = milliseconds(|| on_gpu[1].set_time(now + 1e-3));
@@ -90,15 +92,6 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
     println!(
         "  to record and submit {recording:.2} ms; on the processor {alone:.2} ms, with levels {with_levels:.2} ms, and {copied:.2} ms to copy its samples"
     );
-}
-
-/// Milliseconds that the passes submitted last took, as far as the adapter has a clock.
-fn by_its_clock(gpu: &Gpu) -> f64 {
-    let Some(times) = &gpu.times else { return 0.0 };
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    times.keep(&mut encoder);
-    gpu.queue.submit([encoder.finish()]);
-    times.read(gpu).map_or(0.0, |passes| passes.into_iter().flatten().sum())
 }
 
 fn milliseconds(work: impl FnOnce()) -> f64 {

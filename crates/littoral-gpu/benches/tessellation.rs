@@ -12,11 +12,13 @@
 mod clock;
 #[path = "../../littoral/benches/globe/mod.rs"]
 mod globe;
+mod timer;
 
 use littoral::lod::{Drawing, Limits, Lod, Patches};
 use littoral::space::View;
 use littoral_gpu::{Gpu, TessellationPasses, Tessellator};
 use std::time::Instant;
+use timer::wait;
 
 /// Frames that are measured, after a few that warm up.
 const FRAMES: usize = 31;
@@ -55,8 +57,7 @@ fn main() {
         let mut times = [const { Vec::new() }; 3];
         for frame in 0..FRAMES + 4 {
             let alone = submit(&gpu, &mut tessellator, &view, 1);
-            let ticks = gpu.times.as_ref().and_then(|times| times.read(&gpu).ok());
-            let ticks = ticks.map_or(0.0, |passes| passes.into_iter().flatten().sum());
+            let ticks = timer::read(&gpu).unwrap_or(0.0);
             let in_a_row = submit(&gpu, &mut tessellator, &view, ROW) / f64::from(ROW);
             if frame >= 4 {
                 times.iter_mut().zip([alone, in_a_row, ticks]).for_each(|(times, taken)| times.push(taken));
@@ -90,19 +91,13 @@ fn main() {
     }
 }
 
-fn wait(gpu: &Gpu) {
-    drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
-}
-
-/// Milliseconds from before a number of tessellations are submitted until they are done. One alone leaves its time by the device's clock, too.
+/// Milliseconds from before a number of tessellations are submitted until they are done. One alone is timed by the device's clock, too.
 fn submit(gpu: &Gpu, tessellator: &mut Tessellator, view: &View, number: u32) -> f64 {
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    let times = gpu.times.as_ref().filter(|_| number == 1);
     for _ in 0..number {
-        let timestamps = times.and_then(|times| times.of_compute("tessellation"));
+        let timestamps = if number == 1 { timer::writes(gpu) } else { None };
         tessellator.tessellate(gpu, &mut encoder, view, timestamps).expect("a view that the processor took");
     }
-    times.inspect(|times| times.keep(&mut encoder));
     let commands = encoder.finish();
     let start = Instant::now();
     gpu.queue.submit([commands]);
