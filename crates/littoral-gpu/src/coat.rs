@@ -1,4 +1,4 @@
-//! What the ground is seen as, on the device: nothing but nature, tints by height, or a picture laid over it.
+//! What the ground is seen as, on the device: nothing but nature, tints by height, a picture laid over it, or a shaded relief.
 
 use crate::Gpu;
 use glam::{DAffine2, DVec2, UVec2, Vec3};
@@ -8,9 +8,7 @@ use wgpu::{TextureDimension, TextureFormat};
 /// A coat.
 #[derive(Debug)]
 pub(crate) struct GpuCoat {
-    /// Colours of tints, land in the first row and bed in the second; or the picture, with its means.
-    pub texture: wgpu::Texture,
-    /// 0 for nature, 1 for tints, 2 for a picture.
+    /// 0 for nature, 1 for tints, 2 for a picture, 3 for a shaded relief.
     pub kind: f32,
     /// Heights (m) of the lowest ground, of the land's foot and of the highest ground; by how much slopes are steepened.
     pub tint: [f32; 4],
@@ -21,31 +19,37 @@ pub(crate) struct GpuCoat {
 }
 
 impl GpuCoat {
-    /// Brings a coat to the device. Of a picture larger than its textures the finest mean that fits is taken.
-    pub fn new(gpu: &Gpu, coat: &Coat) -> GpuCoat {
-        let plain = |texture| GpuCoat {
-            texture,
-            kind: 0.0,
-            tint: [0.0, 0.0, 1.0, 1.0],
-            lake: Vec3::ZERO,
-            uv_from_local: DAffine2::IDENTITY,
-        };
+    /// Brings a coat to the device, with its texture: colours of tints, land in the first row and bed in the second; or the picture, with its means. Of a picture larger
+    /// than the device's textures the finest mean that fits is taken.
+    pub fn new(gpu: &Gpu, coat: &Coat) -> (GpuCoat, wgpu::Texture) {
+        let plain =
+            GpuCoat { kind: 0.0, tint: [0.0, 0.0, 1.0, 1.0], lake: Vec3::ZERO, uv_from_local: DAffine2::IDENTITY };
         let make = |format, size: [u32; 2], bytes: &[u8]| {
             crate::scenery::texture(gpu, "coat", format, [size[0], size[1], 1], TextureDimension::D2, bytes)
         };
+        let nothing = || make(TextureFormat::Rgba8Unorm, [1, 1], &[0; 4]);
         match coat {
-            Coat::Natural => plain(make(TextureFormat::Rgba8Unorm, [1, 1], &[0; 4])),
+            Coat::Natural => (plain, nothing()),
             Coat::Tint { land, bed, lake, heights: [low, foot, high], steepening } => {
                 let colours = land.iter().chain(bed).map(|&colour| (colour, 0.0));
                 let halves = crate::scenery::halves(colours);
                 let texture = make(TextureFormat::Rgba16Float, [land.len() as u32, 2], bytemuck::cast_slice(&halves));
                 let tint = [*low, *foot, *high, *steepening];
-                GpuCoat { kind: 1.0, tint, lake: *lake, ..plain(texture) }
+                (GpuCoat { kind: 1.0, tint, lake: *lake, ..plain }, texture)
+            }
+            Coat::Relief { lake, heights: [low, foot, high], steepening } => {
+                let tint = [*low, *foot, *high, *steepening];
+                (GpuCoat { kind: 3.0, tint, lake: *lake, ..plain }, nothing())
             }
             Coat::Image(drape) => {
-                GpuCoat { kind: 2.0, uv_from_local: drape.uv_from_local, ..plain(picture(gpu, &drape.texture)) }
+                (GpuCoat { kind: 2.0, uv_from_local: drape.uv_from_local, ..plain }, picture(gpu, &drape.texture))
             }
         }
+    }
+
+    /// Whether it makes a map, on which water is a colour.
+    pub fn is_map(&self) -> bool {
+        self.kind == 1.0 || self.kind == 3.0
     }
 
     /// From the eye (m) to the picture: both columns of a matrix, and where the eye is.

@@ -146,7 +146,7 @@ impl Expander {
         let bytes =
             (vertices * size_of::<Vertex>() as u64).max(12 * triangles).max(size_of::<Packed>() as u64 * patches);
         let groups = if cells <= 1 { patches.div_ceil(THREADS.into()) } else { patches };
-        let across = groups.min(1 << 15).max(1);
+        let across = groups.clamp(1, 1 << 15);
         let down = groups.div_ceil(across);
         let most_groups = u64::from(gpu.device.limits().max_compute_workgroups_per_dimension);
         if bytes > most || triangles > u64::from(u32::MAX / 3) || cells > MOST_CELLS || down > most_groups {

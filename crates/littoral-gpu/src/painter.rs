@@ -7,7 +7,7 @@ use crate::frame::Look;
 use crate::rays::{ShapeError, ShapeTexture};
 use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
-use crate::tessellator::{Tessellated, Tessellator};
+use crate::tessellator::{Tessellated, TessellationPasses, Tessellator};
 use crate::triangles::{TooMany, Triangles};
 use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
@@ -24,6 +24,8 @@ pub struct Painter {
     scenery: Scenery,
     triangles: Triangles,
     shape: Option<ShapeTexture>,
+    /// Made when the first land is tessellated.
+    tessellation: Option<TessellationPasses>,
     /// What made triangles last.
     maker: Option<Maker>,
     white: [f32; 3],
@@ -88,11 +90,9 @@ pub enum PainterError {
     #[error(transparent)]
     Waves(#[from] WavesError),
     /// Something that it does not draw.
-    #[error(
-        "expected land on a plane in natural colours, tints or a picture, got {got}: the GPU does not draw that yet; draw it on the processor"
-    )]
+    #[error("expected land on a plane, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
-        /// What the stage shows.
+        /// What the stage stands on.
         got: &'static str,
     },
 }
@@ -101,14 +101,12 @@ impl Painter {
     /// A painter of a stage.
     ///
     /// # Errors
-    /// If the stage is a shaded relief, stands on an ellipsoid, or is larger than the device's textures.
+    /// If the stage stands on an ellipsoid, or is larger than the device's textures.
     pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
-        let Some(tables) = stage.tables() else {
-            return Err(PainterError::Unknown { got: "a shaded relief" });
-        };
         let Datum::Plane { origin, size } = stage.land().datum() else {
             return Err(PainterError::Unknown { got: "an ellipsoid" });
         };
+        let tables = stage.tables();
         let height = f64::from(stage.land().height_range().high).max(2.0);
         let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
@@ -119,6 +117,7 @@ impl Painter {
             scenery,
             triangles: Triangles::default(),
             shape: None,
+            tessellation: None,
             maker: None,
             white: tables.white,
             medium: tables.medium,
@@ -169,7 +168,10 @@ impl Painter {
     pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
         let mut tessellator = match self.maker.take() {
             Some(Maker::Patches(kept, tessellator)) if kept == limits => tessellator,
-            _ => Tessellator::new(&self.gpu, land, limits)?,
+            _ => {
+                let passes = self.tessellation.get_or_insert_with(|| TessellationPasses::new(&self.gpu));
+                Tessellator::new(&self.gpu, passes, land, limits)?
+            }
         };
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         tessellator.tessellate(&self.gpu, &mut encoder, view, None)?;
@@ -237,6 +239,9 @@ impl Painter {
         let most = gpu.device.limits().max_texture_dimension_2d;
         if view.size.max_element() > most {
             return Err(PainterError::Picture { got: view.size, most });
+        }
+        if view.size.min_element() == 0 {
+            return Ok(Picture::empty(view.size, view.eye));
         }
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
