@@ -35,6 +35,16 @@ pub struct Shown {
     pub film: Option<(usize, usize)>,
     /// The graphics adapter.
     pub adapter: String,
+    /// What panels leave of the window (points).
+    pub free: Option<egui::Rect>,
+}
+
+impl Shown {
+    /// Whether something of the panel's lies at a place (points). egui itself only knows of the place at which the mouse was a frame ago, which may have been a long one.
+    pub fn covers(&self, context: &egui::Context, at: egui::Pos2) -> bool {
+        let above = context.layer_id_at(at).is_some_and(|layer| layer.order != egui::Order::Background);
+        above || self.free.is_some_and(|free| !free.contains(at))
+    }
 }
 
 /// Everything over the picture.
@@ -51,6 +61,7 @@ pub fn show(ui: &mut Ui, cockpit: &mut Cockpit, shown: &mut Shown, size: UVec2, 
         });
     }
     let rest = ui.available_rect_before_wrap();
+    shown.free = Some(rest);
     notes(ui, cockpit, rest);
     if let Some((done, all)) = shown.film {
         let text = format!("filming: {done} of {all} frames; R stops");
@@ -150,4 +161,56 @@ fn moving(ui: &mut Ui, cockpit: &mut Cockpit) {
             cockpit.home();
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::{Settings, Style};
+    use littoral::lod::Method;
+
+    /// Runs the panel over nothing, in a window of some size (points).
+    fn run(cockpit: &mut Cockpit, size: [f32; 2]) -> (egui::Context, Shown) {
+        let (context, mut shown) = (egui::Context::default(), Shown::default());
+        let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, size.into());
+        for _ in 0..2 {
+            let input = egui::RawInput { screen_rect: Some(screen), ..Default::default() };
+            let size = UVec2::new(size[0] as u32, size[1] as u32);
+            let mut output = context.run_ui(input, |ui| show(ui, cockpit, &mut shown, size, &mut Vec::new()));
+            output.textures_delta.clear(); // nobody paints them
+        }
+        (context, shown)
+    }
+
+    #[test]
+    fn every_style_and_method_has_its_panel_in_windows_of_any_size() {
+        for size in [[1280.0, 720.0], [200.0, 100.0], [1.0, 1.0]] {
+            for style in Style::ALL {
+                for method in Method::ALL {
+                    let mut settings = Settings { style, split: Split::Halves, ..Settings::default() };
+                    (settings.first.method, settings.second.method) = (method, method);
+                    let before = settings.clone();
+                    let mut cockpit = Cockpit::new(settings, Vec::new());
+                    run(&mut cockpit, size);
+                    assert_eq!(cockpit.settings, before, "nothing changes by being shown");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_panel_covers_what_it_covers() {
+        let mut cockpit = Cockpit::new(Settings::default(), Vec::new());
+        let covers = |cockpit: &mut Cockpit, x, y| {
+            let (context, shown) = run(cockpit, [1280.0, 720.0]);
+            shown.covers(&context, egui::pos2(x, y))
+        };
+        assert!(covers(&mut cockpit, 100.0, 300.0), "the panel");
+        assert!(covers(&mut cockpit, 900.0, 715.0), "the status line");
+        assert!(!covers(&mut cockpit, 900.0, 300.0), "the picture");
+        cockpit.settings.split = Split::Halves;
+        assert!(covers(&mut cockpit, 640.0, 360.0), "the handle between two pictures");
+        cockpit.settings.panel = false;
+        assert!(!covers(&mut cockpit, 100.0, 300.0), "the picture under a closed panel");
+    }
 }

@@ -237,6 +237,13 @@ impl Flight {
         }
     }
 
+    /// Whether the mouse is over something of the panel's.
+    fn is_over_panel(&self) -> bool {
+        let context = self.egui.egui_ctx();
+        let at = self.cursor / context.pixels_per_point();
+        self.shown.covers(context, egui::pos2(at.x, at.y))
+    }
+
     /// Runs the panel.
     fn gui(&mut self, size: UVec2) -> Gui {
         let mut asks = Vec::new();
@@ -306,11 +313,11 @@ impl ApplicationHandler for App {
             }
             WindowEvent::MouseInput { state, button, .. } => {
                 let down = state == ElementState::Pressed;
-                if !down || !context.is_pointer_over_egui() {
+                if !down || !flight.is_over_panel() {
                     flight.button(button, down);
                 }
             }
-            WindowEvent::MouseWheel { delta, .. } if !context.is_pointer_over_egui() => {
+            WindowEvent::MouseWheel { delta, .. } if !flight.is_over_panel() => {
                 flight.wheel(match delta {
                     MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
                     MouseScrollDelta::PixelDelta(pixels) => pixels.y / 50.0,
