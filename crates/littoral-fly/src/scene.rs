@@ -303,7 +303,7 @@ fn fly(
         // What the waves are of, and what is being made.
         let mut state: Option<String> = None;
         let mut number = 0;
-        let mut making: Option<std::thread::ScopedJoinHandle<'_, Result<(Sea, Option<Surf>), String>>> = None;
+        let mut making: Option<std::thread::ScopedJoinHandle<'_, Result<Made, String>>> = None;
         let mut draping = Draping::default();
         let mut drape: Option<Arc<Drape>> = None;
         loop {
@@ -454,8 +454,11 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look, drape: Option<&'a 
     }
 }
 
-/// The sea of a state as typed, and its surf.
-fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<(Sea, Option<Surf>), String> {
+/// A sea, and its surf.
+type Made = (Sea, Option<Surf>);
+
+/// The sea of a state as typed.
+fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Made, String> {
     let wrong =
         |problem: String| format!("sea state \"{text}\": {problem}; correct it, for example: beaufort=4,from=225");
     let state: SeaState = text.parse().map_err(|e: littoral::waves::spec::SpecError| wrong(e.to_string()))?;
