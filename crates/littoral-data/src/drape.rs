@@ -75,7 +75,7 @@ mod tests {
             write(file.with_extension("pgw"), world).expect("written");
         }
         let crs_from_local = DAffine2::from_translation(DVec2::new(1000.0, 5000.0));
-        open_drape(&file, &Land::new(raster), &Georeference::none(2, 2), crs_from_local)
+        open_drape(&file, &Land::at(raster, DVec2::ZERO), &Georeference::none(2, 2), crs_from_local)
     }
 
     #[test]
