@@ -1,6 +1,7 @@
 //! Pictures without a window.
 
 use crate::bisector::Bisector;
+use crate::coat::PICTURE_BYTES;
 use crate::device::{Gpu, GpuError};
 use crate::expander::Expander;
 use crate::frame::Look;
@@ -103,12 +104,21 @@ impl Painter {
     /// # Errors
     /// If the stage stands on an ellipsoid, or is larger than the device's textures.
     pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
+        Painter::with_picture_bytes(gpu, stage, PICTURE_BYTES)
+    }
+
+    /// The same where a picture that is laid over the land may take so many bytes of the device (usually 256 MiB): see [`Scenery::with_picture_bytes`].
+    ///
+    /// # Errors
+    /// As [`Painter::new`].
+    pub fn with_picture_bytes(gpu: Gpu, stage: &Stage, bytes: u64) -> Result<Painter, PainterError> {
         let Datum::Plane { origin, size } = stage.land().datum() else {
             return Err(PainterError::Unknown { got: "an ellipsoid" });
         };
         let tables = stage.tables();
         let height = f64::from(stage.land().height_range().high).max(2.0);
-        let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
+        let scenery =
+            Scenery::with_picture_bytes(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)), bytes)?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
         gpu.check()?;
         Ok(Painter {
@@ -246,6 +256,7 @@ impl Painter {
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
+        self.scenery.bring_picture(gpu, stage, view, usize::MAX);
         let ground = match source {
             Source::Mesh(mesh) => {
                 self.triangles.set(gpu, mesh)?;
