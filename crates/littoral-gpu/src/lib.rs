@@ -12,6 +12,7 @@
 mod coat;
 mod device;
 mod frame;
+mod objects;
 mod painter;
 pub mod rays;
 mod read;
@@ -25,6 +26,7 @@ mod waves;
 
 pub use device::{Gpu, GpuError};
 pub use frame::Look;
+pub use objects::TooManyObjects;
 pub use painter::{Painter, PainterError};
 pub use rays::{ShapeError, ShapeTexture};
 pub use renderer::{Ground, Renderer, SHADERS};

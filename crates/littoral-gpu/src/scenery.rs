@@ -3,11 +3,12 @@
 use crate::coat::GpuCoat;
 use crate::device::Gpu;
 use crate::frame::LEVELS;
+use crate::objects::{Objects, TooManyObjects};
 use crate::waves::Waves;
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
 use littoral::field::Sea;
-use littoral::picture::{Lattice, SkyTable, Slab, Tables};
+use littoral::picture::{Lattice, Placed, SkyTable, Slab, Tables};
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{TextureDimension, TextureFormat};
 
@@ -30,6 +31,7 @@ pub struct Scenery {
     /// What water does to light, two rows; and sunlight by height, the third.
     pub(crate) media: wgpu::Texture,
     pub(crate) waves: Option<Waves>,
+    pub(crate) objects: Objects,
     /// Of the lattice that meshes' vertices are on (m), and metres a step.
     pub(crate) origin: DVec2,
     pub(crate) step: DVec2,
@@ -178,6 +180,7 @@ impl Scenery {
             rim: make("rim", TextureFormat::Rg32Float, rim_size, bytemuck::cast_slice(&rim)),
             media: make("media", half, [width as u32, 3, 1], bytemuck::cast_slice(&halves(media))),
             waves: None,
+            objects: Objects::default(),
             origin: datum.0,
             step: datum.1 / (1u64 << 30) as f64,
             map_origin: finest.origin,
@@ -246,6 +249,14 @@ impl Scenery {
         if let Some(waves) = &mut self.waves {
             waves.follow(gpu, sea);
         }
+    }
+
+    /// Draws these objects from here on, in place of those before: [`Stage::placed`](littoral::picture::Stage::placed).
+    ///
+    /// # Errors
+    /// If they do not fit into the device's buffers; then nothing changes.
+    pub fn set_objects(&mut self, gpu: &Gpu, placed: &[Placed]) -> Result<(), TooManyObjects> {
+        self.objects.set(gpu, placed)
     }
 
     /// Light of the sky: azimuths are slices, one after the other for each kind of scattering.
