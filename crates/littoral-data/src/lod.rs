@@ -122,7 +122,14 @@ pub fn with_coarser_forms(object: Object) -> Result<Object, ObjectError> {
         }
         let mut error = 0f32;
         let options = SimplifyOptions::ErrorAbsolute;
-        let left = meshopt::simplify_decoder(welded.as_flattened(), &positions, 3 * enough, f32::MAX, options, Some(&mut error));
+        let left = meshopt::simplify_decoder(
+            welded.as_flattened(),
+            &positions,
+            3 * enough,
+            f32::MAX,
+            options,
+            Some(&mut error),
+        );
         if 4 * left.len() / 3 > 3 * before.triangles.len() || left.is_empty() {
             break; // hardly fewer
         }
@@ -238,7 +245,8 @@ mod tests {
                 assert!(corner.albedo.x == if corner.position.z > 0.0 { 0.6 } else { 0.4 });
             }
         }
-        let few = Object::new(vec![Form { triangles: vec![[0, 1, 2]], ..object.forms()[0].clone() }]).expect("a triangle");
+        let few =
+            Object::new(vec![Form { triangles: vec![[0, 1, 2]], ..object.forms()[0].clone() }]).expect("a triangle");
         assert_eq!(with_coarser_forms(few.clone()), Ok(few));
     }
 

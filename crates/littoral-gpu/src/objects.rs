@@ -19,11 +19,7 @@ use wgpu::util::DeviceExt;
 /// The shader with its name.
 pub(crate) const OBJECT_SHADER: (&str, &str) = (
     "objects",
-    concat!(
-        include_str!("shaders/frame.wgsl"),
-        include_str!("shaders/air.wgsl"),
-        include_str!("shaders/objects.wgsl"),
-    ),
+    concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/air.wgsl"), include_str!("shaders/objects.wgsl"),),
 );
 
 /// `Placed` of the shader.

@@ -10,7 +10,8 @@ use std::sync::Arc;
 
 /// Land of 2 km, a sample every 10 m.
 fn land(height: impl Fn(DVec2) -> f64) -> Land {
-    let heights = (0..201 * 201).map(|i| height(DVec2::new((i % 201) as f64, (i / 201) as f64) * 10.0) as f32).collect();
+    let heights =
+        (0..201 * 201).map(|i| height(DVec2::new((i % 201) as f64, (i / 201) as f64) * 10.0) as f32).collect();
     Land::at(Raster::new(201, 201, DVec2::splat(10.0), heights).expect("valid"), DVec2::ZERO)
 }
 
@@ -73,7 +74,8 @@ fn what_stands_in_water_shows_above_it_and_what_floats_lies_on_it() {
     let water = Water::flood(&land, 0.0).expect("a sea");
     let pile = block(Vec3::new(15.0, 15.0, 10.0), Vec3::Z * 10.0, Vec3::splat(0.5));
     let at = DVec2::new(1000.0, 700.0);
-    let pose = |footing| Standing { footing, ..Standing::at(&pile, at) }.pose(&land, Some(&water), None).expect("somewhere");
+    let pose =
+        |footing| Standing { footing, ..Standing::at(&pile, at) }.pose(&land, Some(&water), None).expect("somewhere");
     assert_eq!(pose(Footing::Ground).origin, at.extend(-8.0));
     assert_eq!(pose(Footing::Surface).origin, at.extend(0.0));
     assert_eq!(Standing::at(&pile, DVec2::new(1e5, 2e5)).pose(&land, None, None), None);
@@ -132,7 +134,8 @@ fn it_turns_clockwise_and_stands_on_the_full_data_whatever_is_drawn() {
     let coarse = stage.render_meshes(&meshes, None, &view, &settings, &|_| {});
     assert!(exact.height != coarse.height, "the ground is drawn coarsely");
     // The bar stays where it is, above what is drawn, but for its edges, at which the ground is seen, too.
-    let red = |picture: &Picture, i: usize| picture.radiance[i][0] > 3.0 * picture.radiance[i][1] && picture.height[i] > 85.0;
+    let red =
+        |picture: &Picture, i: usize| picture.radiance[i][0] > 3.0 * picture.radiance[i][1] && picture.height[i] > 85.0;
     let both: Vec<usize> = (0..exact.radiance.len()).filter(|&i| red(&exact, i) && red(&coarse, i)).collect();
     let one = (0..exact.radiance.len()).filter(|&i| red(&exact, i) != red(&coarse, i)).count();
     assert!(both.len() > 100 && one < 10, "{} {one}", both.len());
@@ -182,7 +185,8 @@ fn far_away_a_coarse_form_does() {
         let pixels = |number: usize| lighthouse.forms()[number].error * focal / ((1 << k) as f32 - radius - 5.0);
         assert!(pixels(number) < 0.55, "{number} at {k}");
     }
-    let behind = View::looking_at(DVec3::new(1000.0, 1000.0, 60.0), DVec3::new(1000.0, 1000.0, 900.0), 0.8, UVec2::new(64, 64));
+    let behind =
+        View::looking_at(DVec3::new(1000.0, 1000.0, 60.0), DVec3::new(1000.0, 1000.0, 900.0), 0.8, UVec2::new(64, 64));
     assert_eq!(pose.form(&lighthouse, &behind), None);
 }
 
@@ -191,10 +195,14 @@ fn a_thousand_of_them_give_the_same_picture_twice_and_none_of_a_map() {
     let land = land(|at| 20.0 * (at.x * 0.01).sin());
     let boulder = Arc::new(lighthouse());
     let objects: Vec<Standing> = (0..1000)
-        .map(|i| Standing { scale: 0.2, ..Standing::at(&boulder, DVec2::new(f64::from(i % 40), f64::from(i / 40)) * 48.0 + 40.0) })
+        .map(|i| Standing {
+            scale: 0.2,
+            ..Standing::at(&boulder, DVec2::new(f64::from(i % 40), f64::from(i / 40)) * 48.0 + 40.0)
+        })
         .collect();
     let scene = Scene { objects: &objects, ..Scene::new(&land, None) };
-    let view = View::looking_at(DVec3::new(1000.0, -300.0, 200.0), DVec3::new(1000.0, 900.0, 0.0), 0.8, UVec2::new(96, 64));
+    let view =
+        View::looking_at(DVec3::new(1000.0, -300.0, 200.0), DVec3::new(1000.0, 900.0, 0.0), 0.8, UVec2::new(96, 64));
     let first = render(&scene, &view);
     assert_eq!(first.radiance, render(&scene, &view).radiance);
     assert_ne!(first.radiance, render(&Scene { objects: &[], ..scene }, &view).radiance);

@@ -47,7 +47,11 @@ pub fn described(json: &[u8]) -> Result<Root, String> {
     let mut root: Root = gltf::json::deserialize::from_slice(json).map_err(|e| wrong(e.to_string()))?;
     // Numbers of any size are read here, which is all that this one asks for.
     root.extensions_required.retain(|name| name != "KHR_mesh_quantization");
-    if let Some(name) = root.extensions_required.iter().find(|name| !name.starts_with("KHR_materials_") && *name != "KHR_texture_transform") {
+    if let Some(name) = root
+        .extensions_required
+        .iter()
+        .find(|name| !name.starts_with("KHR_materials_") && *name != "KHR_texture_transform")
+    {
         return Err(format!("expected plain glTF, got one that needs {name}; export it without compression"));
     }
     // Materials that need more than a base colour are drawn in that.
@@ -84,14 +88,19 @@ pub fn buffers<'a>(
                 Some(data) => {
                     let text = data.split_once(";base64,").map(|(_, text)| text);
                     let decoded = text.and_then(|text| BASE64_STANDARD.decode(text).ok());
-                    decoded.ok_or_else(|| format!("expected base64 in buffer {number}, got something else; export it as .glb"))?
+                    decoded.ok_or_else(|| {
+                        format!("expected base64 in buffer {number}, got something else; export it as .glb")
+                    })?
                 }
                 None => beside(uri).map_err(|problem| format!("buffer {number}: {problem}"))?,
             }),
         };
         total += if matches!(bytes, Cow::Owned(_)) { bytes.len() as u64 } else { 0 };
         if total > super::LONGEST {
-            return Err(format!("expected buffers of at most {} bytes together, got more; simplify it", super::LONGEST));
+            return Err(format!(
+                "expected buffers of at most {} bytes together, got more; simplify it",
+                super::LONGEST
+            ));
         }
         if (bytes.len() as u64) < buffer.byte_length.0 {
             return Err(cut_off(buffer.byte_length.0, bytes.len()));
@@ -129,7 +138,9 @@ impl<'a> Numbers<'a> {
             _ => return Err(format!("expected vectors in accessor {number}, got matrices; export it anew")),
         };
         let (Some(view), None) = (accessor.buffer_view, &accessor.sparse) else {
-            return Err(format!("expected the numbers of accessor {number}, got a sparse one; export it without morphs"));
+            return Err(format!(
+                "expected the numbers of accessor {number}, got a sparse one; export it without morphs"
+            ));
         };
         let view = &root.buffer_views[view.value()];
         let size = width * component.0.size();

@@ -48,11 +48,17 @@ fn whole(file: &Path) -> Result<Vec<u8>, Error> {
     // Asked before opening: opening a pipe would wait for its other end.
     let metadata = std::fs::metadata(file).map_err(|e| Error::io(file, e))?;
     if !metadata.is_file() {
-        return Err(Error::content(file, "expected an object's file (.glb or .gltf), got a folder or device; name a file"));
+        return Err(Error::content(
+            file,
+            "expected an object's file (.glb or .gltf), got a folder or device; name a file",
+        ));
     }
     if metadata.len() > LONGEST {
         let got = metadata.len();
-        return Err(Error::content(file, format!("expected at most {LONGEST} bytes of an object, got {got}; simplify it")));
+        return Err(Error::content(
+            file,
+            format!("expected at most {LONGEST} bytes of an object, got {got}; simplify it"),
+        ));
     }
     std::fs::read(file).map_err(|e| Error::io(file, e))
 }

@@ -2,8 +2,8 @@
 
 use super::{ObjectFile, open_object};
 use crate::Error;
-use littoral::objects::{buoy, lighthouse};
 use glam::DVec2;
+use littoral::objects::{buoy, lighthouse};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -28,7 +28,8 @@ impl FromStr for ObjectOrder {
         let wrong = |expected: &str| format!("expected {expected}, got \"{text}\"");
         let form = "FILE@X,Y or FILE@X,Y,HEADING,SCALE such as boat.glb@2600,900,135";
         let (file, rest) = text.rsplit_once('@').filter(|(file, _)| !file.is_empty()).ok_or_else(|| wrong(form))?;
-        let numbers: Option<Vec<f64>> = rest.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
+        let numbers: Option<Vec<f64>> =
+            rest.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
         let numbers = numbers.filter(|numbers| (2..=4).contains(&numbers.len())).ok_or_else(|| wrong(form))?;
         let scale = numbers.get(3).copied().unwrap_or(1.0);
         if !(1e-4..=1e4).contains(&scale) {

@@ -1,11 +1,11 @@
 //! A glTF scene as one form: every node's meshes where it has them, turned from y up to z up.
 
 use super::bytes::Numbers;
+use glam::{Mat3, Mat4, Quat, Vec3};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Root, scene};
 use littoral::objects::{Corner, Form, creased};
-use glam::{Mat3, Mat4, Quat, Vec3};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
@@ -130,7 +130,9 @@ impl<'a> Builder<'a> {
         if linear.determinant() < 0.0 {
             list.iter_mut().for_each(|triangle| triangle.swap(1, 2)); // mirrored
         }
-        let normals = self.numbers(primitive, Semantic::Normals)?.filter(|normals| normals.width == 3 && normals.count >= positions.count);
+        let normals = self
+            .numbers(primitive, Semantic::Normals)?
+            .filter(|normals| normals.width == 3 && normals.count >= positions.count);
         let colours = self.numbers(primitive, Semantic::Colors(0))?.filter(|colours| colours.count >= positions.count);
         let (base, textured) = self.base(primitive);
         let albedo = |vertex: usize| base * colours.as_ref().map_or(Vec3::ONE, |colours| colours.vector(vertex).into());

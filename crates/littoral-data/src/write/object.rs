@@ -36,7 +36,8 @@ fn described(object: &Object) -> (serde_json::Value, Vec<u8>) {
     }
     let count = form.corners.len();
     let vectors = 12 * count;
-    let view = |number: usize| json!({ "buffer": 0, "byteOffset": number * vectors, "byteLength": vectors, "target": 34_962 });
+    let view =
+        |number: usize| json!({ "buffer": 0, "byteOffset": number * vectors, "byteLength": vectors, "target": 34_962 });
     let vector = |view: usize| json!({ "bufferView": view, "componentType": 5126, "count": count, "type": "VEC3" });
     let mut positions = vector(0);
     (positions["min"], positions["max"]) = (json!(low.to_array()), json!(high.to_array()));

@@ -144,6 +144,8 @@ mod tests {
             let errors: Vec<f32> = object.forms().iter().map(|form| form.error).collect();
             assert!(errors[0] == 0.0 && errors.windows(2).all(|pair| pair[0] < pair[1]), "{errors:?}");
         }
-        assert!(lathe(&[], &[8]).is_err() && lathe(&[Rung { radius: 1.0, height: 0.0, albedo: Vec3::ONE }], &[]).is_err());
+        assert!(
+            lathe(&[], &[8]).is_err() && lathe(&[Rung { radius: 1.0, height: 0.0, albedo: Vec3::ONE }], &[]).is_err()
+        );
     }
 }

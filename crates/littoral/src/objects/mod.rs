@@ -137,7 +137,8 @@ mod tests {
     use super::*;
 
     fn triangle() -> Form {
-        let at = |x: f32, y: f32| Corner { position: Vec3::new(x, y, 0.0), normal: Vec3::Z * 3.0, albedo: Vec3::splat(2.0) };
+        let at =
+            |x: f32, y: f32| Corner { position: Vec3::new(x, y, 0.0), normal: Vec3::Z * 3.0, albedo: Vec3::splat(2.0) };
         Form { corners: vec![at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0)], triangles: vec![[0, 1, 2]], error: 0.0 }
     }
 
@@ -174,6 +175,9 @@ mod tests {
     fn the_coarsest_form_that_is_near_enough_is_taken() {
         let forms = [0.0, 0.1, 0.5].map(|error| Form { error, ..triangle() });
         let object = Object::new(forms.to_vec()).expect("an object");
-        assert_eq!([0.0, 0.05, 0.1, 0.4, 0.5, 9.0, f32::NAN].map(|error| object.form_within(error)), [0, 0, 1, 1, 2, 2, 0]);
+        assert_eq!(
+            [0.0, 0.05, 0.1, 0.4, 0.5, 9.0, f32::NAN].map(|error| object.form_within(error)),
+            [0, 0, 1, 1, 2, 2, 0]
+        );
     }
 }

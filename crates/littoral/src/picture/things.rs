@@ -68,7 +68,8 @@ impl Things {
                 return;
             }
             let (corners, shares) = self.drawn.shares(triangle, directions[k]);
-            let blend = |of: &dyn Fn(usize) -> Vec3| corners.into_iter().zip(shares).map(|(v, s)| of(v as usize) * s).sum();
+            let blend =
+                |of: &dyn Fn(usize) -> Vec3| corners.into_iter().zip(shares).map(|(v, s)| of(v as usize) * s).sum();
             let normal: Vec3 = blend(&|v| self.looks[v].0);
             // Seen from behind, it is the other side's.
             let normal = if self.drawn.faces(triangle) { normal } else { -normal };
@@ -112,7 +113,8 @@ impl Stage<'_> {
                 [0.0, 1.0, 2.0, 3.0].map(|third| {
                     let height = low.z + (high.z - low.z) * third / 3.0;
                     // What is in the ground is as sunny as the ground.
-                    let up = (placed.pose.axes.z_axis * height).max(Vec3::new(-1e6, -1e6, 0.05 * self.ground.spacing()));
+                    let up =
+                        (placed.pose.axes.z_axis * height).max(Vec3::new(-1e6, -1e6, 0.05 * self.ground.spacing()));
                     LocalRay::new(foot + up, self.sun)
                 })
             })

@@ -111,10 +111,16 @@ mod tests {
         let view = View::looking_at(DVec3::new(5.0, 6.0, 70.0), DVec3::new(50.0, 90.0, 20.0), 0.8, size);
         let mut missed = 0;
         for i in 0..4000u32 {
-            let turn = |k: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 8) as f32 / 16_777_216.0 - 0.5;
+            let turn =
+                |k: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 8) as f32 / 16_777_216.0 - 0.5;
             let (middle, radius) = (300.0 * Vec3::new(turn(1), turn(7), turn(31)), 20.0 * (turn(77) + 0.5));
-            let within = |at: Vec3| view.pixel(view.eye + at.as_dvec3()).is_some_and(|p| p.cmpge(Vec2::ZERO).all() && p.cmple(size.as_vec2()).all());
-            let sees = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].iter().any(|to| within(middle + *to * radius) || within(middle - *to * radius));
+            let within = |at: Vec3| {
+                view.pixel(view.eye + at.as_dvec3())
+                    .is_some_and(|p| p.cmpge(Vec2::ZERO).all() && p.cmple(size.as_vec2()).all())
+            };
+            let sees = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z]
+                .iter()
+                .any(|to| within(middle + *to * radius) || within(middle - *to * radius));
             assert!(!sees || view.may_see(middle, radius), "{middle} {radius}");
             missed += u32::from(!view.may_see(middle, radius));
         }
