@@ -186,7 +186,8 @@ fn what_is_wrong_is_told() {
         change(&mut value);
         read_json(&value).map(|_| ()).expect_err("wrong")
     };
-    let cases: [(&dyn Fn(&mut Value), &str); 12] = [
+    type Change<'a> = &'a dyn Fn(&mut Value);
+    let cases: [(Change, &str); 12] = [
         (&|v| v["accessors"][0]["count"] = json!(4), "expected 4 vectors of 12 bytes in accessor 0"),
         (&|v| v["accessors"][0]["count"] = json!(u64::MAX), "got fewer bytes"),
         (&|v| v["accessors"][0]["byteOffset"] = json!(u64::MAX), "got fewer bytes"),

@@ -86,7 +86,7 @@ fn a_lighthouse_and_buoys_on_the_coast_look_as_rays_see_them() {
     let water = Water::flood(&land, 0.0).expect("a sea");
     let shot = coast_shot(size);
     let (tower, float) = (Arc::new(lighthouse()), Arc::new(buoy()));
-    let place = DVec2::new(2800.0, 2050.0);
+    let place = DVec2::new(3030.0, 1310.0);
     let top = f64::from(land.height_at(place).expect("known"));
     let objects = [
         Standing::at(&tower, place),
