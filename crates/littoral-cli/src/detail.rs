@@ -49,6 +49,8 @@ pub struct Chooser<'a> {
     land: &'a Land,
     limits: Limits,
     ground: Box<dyn Lod>,
+    /// Land prepared for ROAM.
+    prepared: Option<&'a NestedBounds>,
     /// ROAM over prepared land, which goes on from picture to picture.
     flight: Option<RoamFlight<'a>>,
     ground_drawing: Drawing,
@@ -70,9 +72,8 @@ impl Drawer<'_> {
     pub fn choose(&mut self, sea: Option<&Sea>, view: &View) -> Result<Option<Told>, Failure> {
         let Some(chooser) = &mut self.chooser else { return Ok(None) };
         match &mut self.painter {
-            // What can look at all patches at once does it itself.
-            Some(painter) if chooser.is_patches() => chooser.tessellate(painter, view),
-            _ => chooser.choose(sea, view),
+            Some(painter) => chooser.choose_on(painter, view),
+            None => chooser.choose(sea, view),
         }
         .map(Some)
     }
@@ -93,13 +94,8 @@ impl Drawer<'_> {
             painter.set_objects(&stage.placed(sea)).map_err(unpainted)?;
             let told = |done| told(done);
             let painted = match &self.chooser {
-                Some(chooser) if chooser.is_patches() => {
-                    painter.picture_of_patches(stage, view, settings.samples, &told)
-                }
-                chooser => {
-                    let ground = chooser.as_ref().map(Chooser::ground);
-                    painter.picture(stage, ground, view, settings.samples, &told)
-                }
+                Some(_) => painter.picture_of_made(stage, view, settings.samples, &told),
+                None => painter.picture(stage, None, view, settings.samples, &told),
             };
             return painted.map_err(unpainted);
         }
@@ -148,7 +144,8 @@ impl Detail {
             land,
             limits,
             ground: self.lod?.within(limits),
-            flight: prepared.map(|bounds| RoamFlight::over(bounds, limits)),
+            prepared,
+            flight: prepared.filter(|_| !self.gpu).map(|bounds| RoamFlight::over(bounds, limits)),
             ground_drawing: Drawing::default(),
             water: None,
             water_drawing: Drawing::default(),
@@ -198,8 +195,6 @@ impl Chooser<'_> {
             }
             None => choose(&mut *self.ground, self.land, &view, &mut self.ground_drawing)?,
         };
-        // The graphics card has triangles of its own for the sea.
-        let sea = sea.filter(|_| !self.detail.gpu);
         self.shows_water = sea.is_some();
         if let Some(sea) = sea {
             // No cell of water is smaller than this (m).
@@ -218,15 +213,21 @@ impl Chooser<'_> {
         Ok(told)
     }
 
-    fn is_patches(&self) -> bool {
-        self.detail.lod == Some(Method::Patches)
-    }
-
-    /// Lets the graphics card choose the ground for a view.
-    fn tessellate(&self, painter: &mut Painter, view: &View) -> Result<Told, Failure> {
+    /// Chooses the ground for a view on the graphics card, if that knows the method; else it makes triangles of what the processor chose. It has
+    /// triangles of its own for the sea.
+    fn choose_on(&mut self, painter: &mut Painter, view: &View) -> Result<Told, Failure> {
         let view = View { tolerance_pixels: self.detail.tolerance as f32, ..*view };
         let started = Instant::now();
-        let chosen = painter.tessellate(self.land, self.limits, &view).map_err(unpainted)?;
+        let chosen = match (self.detail.lod, self.prepared) {
+            (Some(Method::Roam), Some(bounds)) => painter.bisect(bounds, self.limits, &view),
+            (Some(Method::Patches), _) => painter.tessellate(self.land, self.limits, &view),
+            _ => {
+                let reached = self.ground.select(self.land, &view, &mut self.ground_drawing).map_err(refused)?;
+                let triangles = painter.expand(self.land, &mut self.ground_drawing).map_err(unpainted)?;
+                return Ok(Told::of(reached, triangles, started));
+            }
+        }
+        .map_err(unpainted)?;
         Ok(Told::of(chosen.reached, chosen.triangles as usize, started))
     }
 

@@ -12,11 +12,13 @@
 mod clock;
 #[path = "../../littoral/benches/globe/mod.rs"]
 mod globe;
+mod timer;
 
 use littoral::lod::{Drawing, Limits, Lod, Patches};
 use littoral::space::View;
 use littoral_gpu::{Gpu, Tessellator};
 use std::time::Instant;
+use timer::{Timer, wait};
 
 /// Frames that are measured, after a few that warm up.
 const FRAMES: usize = 31;
@@ -69,14 +71,15 @@ fn main() {
             Ok(told) => told,
             Err(error) => return println!("{error}"),
         };
-        let bytes = 8 * u64::from(told.cells) + (16 + 4) * u64::from(told.vertices) + 12 * u64::from(told.triangles);
+        let bytes =
+            8 * u64::from(told.looked_at) + (16 + 4) * u64::from(told.vertices) + 12 * u64::from(told.triangles);
         println!(
             "down to level {finest}, {tolerance} pixels asked, {:.2} reached: {} -> {} triangles ({} on the processor), {} cells looked at; made ready in {made:.1} s",
             told.reached.pixels,
             2u64 << (2 * finest - 1),
             told.triangles,
             drawing.triangles(),
-            told.cells,
+            told.looked_at,
         );
         let clock = if timer.is_some() { format!("{ticks:.3} ms by its clock") } else { "no clock".to_owned() };
         println!(
@@ -86,10 +89,6 @@ fn main() {
             1e-6 * bytes as f64 / in_a_row
         );
     }
-}
-
-fn wait(gpu: &Gpu) {
-    drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
 }
 
 /// Milliseconds from before a number of tessellations are submitted until they are done.
@@ -104,57 +103,4 @@ fn submit(gpu: &Gpu, tessellator: &mut Tessellator, view: &View, number: u32, ti
     gpu.queue.submit([commands]);
     wait(gpu);
     start.elapsed().as_secs_f64() * 1e3
-}
-
-/// The device's own clock.
-struct Timer {
-    queries: wgpu::QuerySet,
-    resolved: wgpu::Buffer,
-    read: wgpu::Buffer,
-}
-
-impl Timer {
-    fn new(gpu: &Gpu) -> Option<Timer> {
-        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return None;
-        }
-        let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-            label: Some("timer"),
-            ty: wgpu::QueryType::Timestamp,
-            count: 2,
-        });
-        let buffer = |usage| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("timer"),
-                size: 16,
-                usage,
-                mapped_at_creation: false,
-            })
-        };
-        use wgpu::BufferUsages as Usage;
-        let resolved = buffer(Usage::QUERY_RESOLVE | Usage::COPY_SRC);
-        Some(Timer { queries, resolved, read: buffer(Usage::COPY_DST | Usage::MAP_READ) })
-    }
-
-    fn writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
-        wgpu::ComputePassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        }
-    }
-
-    /// Milliseconds of the pass that it was given to last.
-    fn read(&self, gpu: &Gpu) -> f64 {
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.resolve_query_set(&self.queries, 0..2, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.read, 0, 16);
-        gpu.queue.submit([encoder.finish()]);
-        self.read.map_async(wgpu::MapMode::Read, .., |_| {});
-        wait(gpu);
-        let ticks =
-            self.read.get_mapped_range(..).map_or([0; 2], |bytes| bytemuck::pod_read_unaligned::<[u64; 2]>(&bytes));
-        self.read.unmap();
-        ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(gpu.queue.get_timestamp_period()) * 1e-6
-    }
 }

@@ -9,8 +9,11 @@
 //!
 //! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
+mod bisector;
 mod coat;
+mod compute;
 mod device;
+mod expander;
 mod frame;
 mod objects;
 mod painter;
@@ -24,7 +27,9 @@ mod times;
 mod triangles;
 mod waves;
 
+pub use bisector::{BISECTION_SHADERS, Bisector};
 pub use device::{Gpu, GpuError};
+pub use expander::{EXPANSION_SHADER, Expander};
 pub use frame::Look;
 pub use objects::TooManyObjects;
 pub use painter::{Painter, PainterError};

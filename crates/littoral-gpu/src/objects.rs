@@ -19,7 +19,12 @@ use wgpu::util::DeviceExt;
 /// The shader with its name.
 pub(crate) const OBJECT_SHADER: (&str, &str) = (
     "objects",
-    concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/air.wgsl"), include_str!("shaders/objects.wgsl"),),
+    concat!(
+        include_str!("shaders/frame.wgsl"),
+        include_str!("shaders/ground.wgsl"),
+        include_str!("shaders/air.wgsl"),
+        include_str!("shaders/objects.wgsl"),
+    ),
 );
 
 /// `Placed` of the shader.
@@ -220,7 +225,9 @@ impl ObjectPass {
             .insert(kept.unwrap_or_else(|| drawable(gpu, "behind", size, RADIANCE, wgpu::TextureUsages::COPY_DST)));
         encoder.copy_texture_to_texture(radiance.as_image_copy(), behind.as_image_copy(), radiance.size());
         let textures = [
-            (1, &*behind),
+            (20, &*behind),
+            (1, &scenery.fine),
+            (2, &scenery.coarse),
             (7, &scenery.eye_light),
             (8, &scenery.eye_through),
             (10, &scenery.skylight),

@@ -1,6 +1,8 @@
 //! Pictures without a window.
 
+use crate::bisector::Bisector;
 use crate::device::{Gpu, GpuError};
+use crate::expander::Expander;
 use crate::frame::Look;
 use crate::objects::TooManyObjects;
 use crate::rays::{ShapeError, ShapeTexture};
@@ -11,7 +13,7 @@ use crate::triangles::{TooMany, Triangles};
 use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
 use littoral::field::{HeightField, Land, Sea};
-use littoral::lod::{Limits, Mesh, ViewError};
+use littoral::lod::{Drawing, Limits, Mesh, NestedBounds, ViewError};
 use littoral::picture::{Medium, Picture, Placed, Stage};
 use littoral::space::{Datum, View};
 
@@ -23,17 +25,35 @@ pub struct Painter {
     scenery: Scenery,
     triangles: Triangles,
     shape: Option<ShapeTexture>,
-    /// What was tessellated last, and the limits that were asked for.
-    patches: Option<(Limits, Tessellator)>,
+    /// What made triangles last.
+    maker: Option<Maker>,
     white: [f32; 3],
     medium: Medium,
+}
+
+/// What makes triangles on the device, with the limits that were asked for.
+#[derive(Debug)]
+enum Maker {
+    Patches(Limits, Tessellator),
+    Bisection(Limits, Bisector),
+    Drawing(Expander),
+}
+
+impl Maker {
+    fn triangles(&self) -> &Triangles {
+        match self {
+            Maker::Patches(_, tessellator) => tessellator.triangles(),
+            Maker::Bisection(_, bisector) => bisector.triangles(),
+            Maker::Drawing(expander) => expander.triangles(),
+        }
+    }
 }
 
 /// Where the ground of a picture comes from.
 enum Source<'a> {
     Mesh(&'a Mesh),
-    /// What was tessellated last.
-    Patches,
+    /// What the device made last.
+    Made,
     Rays,
 }
 
@@ -103,7 +123,7 @@ impl Painter {
             scenery,
             triangles: Triangles::default(),
             shape: None,
-            patches: None,
+            maker: None,
             white: tables.white,
             medium: tables.medium,
         })
@@ -165,29 +185,62 @@ impl Painter {
     /// # Errors
     /// If the land is larger than the device's textures, the view is not one that a picture can be drawn of, or the device was lost.
     pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
-        let patches = match self.patches.take() {
-            Some(patches) if patches.0 == limits => patches,
-            _ => (limits, Tessellator::new(&self.gpu, land, limits)?),
+        let mut tessellator = match self.maker.take() {
+            Some(Maker::Patches(kept, tessellator)) if kept == limits => tessellator,
+            _ => Tessellator::new(&self.gpu, land, limits)?,
         };
-        let (_, patches) = self.patches.insert(patches);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        patches.tessellate(&self.gpu, &mut encoder, view, None)?;
+        tessellator.tessellate(&self.gpu, &mut encoder, view, None)?;
         self.gpu.queue.submit([encoder.finish()]);
-        Ok(patches.read(&self.gpu)?)
+        let told = tessellator.read(&self.gpu)?;
+        self.maker = Some(Maker::Patches(limits, tessellator));
+        Ok(told)
     }
 
-    /// The same as [`Painter::picture`], the ground being what was tessellated last.
+    /// The same by bisection, which goes on from what was drawn before: see [`Bisector`].
     ///
     /// # Errors
     /// As there.
-    pub fn picture_of_patches(
+    pub fn bisect(&mut self, bounds: &NestedBounds, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
+        let mut bisector = match self.maker.take() {
+            Some(Maker::Bisection(kept, bisector)) if kept == limits => bisector,
+            _ => Bisector::new(&self.gpu, bounds, limits)?,
+        };
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        bisector.bisect(&self.gpu, &mut encoder, view, None)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        let told = bisector.read(&self.gpu)?;
+        self.maker = Some(Maker::Bisection(limits, bisector));
+        Ok(told)
+    }
+
+    /// Turns what a method drew of a land, that of the stage, into triangles on the device: see [`Expander`]. Returns how many there are.
+    ///
+    /// # Errors
+    /// If the land or the drawing is larger than the device's textures or buffers, or the device was lost.
+    pub fn expand(&mut self, land: &Land, drawing: &mut Drawing) -> Result<usize, PainterError> {
+        let mut expander = match self.maker.take() {
+            Some(Maker::Drawing(expander)) => expander,
+            _ => Expander::new(&self.gpu, land)?,
+        };
+        expander.expand(&self.gpu, drawing)?;
+        let count = expander.count(&self.gpu)?;
+        self.maker = Some(Maker::Drawing(expander));
+        Ok(count as usize)
+    }
+
+    /// The same as [`Painter::picture`], the ground being the triangles that the device made last.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn picture_of_made(
         &mut self,
         stage: &Stage,
         view: &View,
         looks: u32,
         progress: &dyn Fn(f32),
     ) -> Result<Picture, PainterError> {
-        self.paint(stage, Source::Patches, view, looks, progress)
+        self.paint(stage, Source::Made, view, looks, progress)
     }
 
     fn paint(
@@ -211,9 +264,7 @@ impl Painter {
                 self.triangles.set(gpu, mesh)?;
                 Ground::Triangles(&self.triangles)
             }
-            Source::Patches => {
-                Ground::Triangles(self.patches.as_ref().map_or(&self.triangles, |(_, patches)| patches.triangles()))
-            }
+            Source::Made => Ground::Triangles(self.maker.as_ref().map_or(&self.triangles, Maker::triangles)),
             Source::Rays => {
                 let shape = match self.shape.take() {
                     Some(shape) => shape,

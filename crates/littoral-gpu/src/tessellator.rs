@@ -15,6 +15,7 @@
 
 mod land;
 
+use crate::compute::{TEXELS, bind, binding, layout, read};
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use crate::triangles::Triangles;
@@ -74,7 +75,7 @@ struct State {
     firsts: [u32; 32],
 }
 
-/// What a tessellation came to, read back.
+/// What a tessellation or a bisection came to, read back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tessellated {
     /// As [`littoral::lod::Lod::select`] tells it.
@@ -83,8 +84,8 @@ pub struct Tessellated {
     pub triangles: u32,
     /// Vertices drawn.
     pub vertices: u32,
-    /// Cells that were looked at.
-    pub cells: u32,
+    /// Cells or diamonds that were looked at.
+    pub looked_at: u32,
 }
 
 /// Tessellates a land on the device. Made once for a land; made anew when that changes.
@@ -362,7 +363,7 @@ impl Tessellator {
             triangles = bytemuck::pod_read_unaligned::<u32>(&read(gpu, drawn, 4)?) / 3;
         }
         let reached = Reached { pixels: state.reached, limited: state.reached > self.tolerance };
-        Ok(Tessellated { reached, triangles, vertices: state.vertices, cells: state.used })
+        Ok(Tessellated { reached, triangles, vertices: state.vertices, looked_at: state.used })
     }
 
     /// The triangles that were submitted last, read back. Waits for the device: for tests and tools.
@@ -371,71 +372,6 @@ impl Tessellator {
     /// If the device was lost.
     pub fn mesh(&self, gpu: &Gpu) -> Result<Mesh, GpuError> {
         let Tessellated { triangles, vertices, .. } = self.read(gpu)?;
-        let (Some(from), Some(corners)) = (&self.triangles.vertices, &self.triangles.corners) else {
-            return Ok(Mesh::default());
-        };
-        let vertices = read(gpu, from, u64::from(vertices) * size_of::<Vertex>() as u64)?;
-        let corners = read(gpu, corners, 12 * u64::from(triangles))?;
-        Ok(Mesh {
-            vertices: bytemuck::pod_collect_to_vec(&vertices),
-            triangles: bytemuck::pod_collect_to_vec(&corners),
-        })
+        self.triangles.read(gpu, vertices, triangles)
     }
-}
-
-/// A texture of whole numbers that is read texel by texel.
-const TEXELS: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Uint,
-    view_dimension: wgpu::TextureViewDimension::D2,
-    multisampled: false,
-};
-
-fn binding(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
-    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
-}
-
-fn layout(device: &wgpu::Device, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
-    let entry = |(binding, &ty): (u32, &wgpu::BindingType)| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty,
-        count: None,
-    };
-    let entries: Vec<_> = (0..).zip(types).map(entry).collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("tessellation"), entries: &entries })
-}
-
-fn bind(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    resources: Vec<wgpu::BindingResource>,
-) -> wgpu::BindGroup {
-    let entries = (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("tessellation"),
-        layout,
-        entries: &entries.collect::<Vec<_>>(),
-    })
-}
-
-/// The first bytes of a buffer.
-fn read(gpu: &Gpu, from: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, GpuError> {
-    if bytes == 0 {
-        return Ok(Vec::new());
-    }
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("read back"),
-        size: bytes,
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    encoder.copy_buffer_to_buffer(from, 0, &buffer, 0, bytes);
-    gpu.queue.submit([encoder.finish()]);
-    buffer.map_async(wgpu::MapMode::Read, .., |_| {});
-    gpu.check()?;
-    let lost = |e: &dyn std::fmt::Display| GpuError::Lost { adapter: gpu.adapter.name.clone(), reason: e.to_string() };
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| lost(&e))?;
-    let mapped = buffer.get_mapped_range(..).map_err(|e| lost(&e))?;
-    Ok(mapped.to_vec())
 }

@@ -1,7 +1,8 @@
 //! Triangles of a surface on the device.
 
-use crate::device::Gpu;
-use littoral::lod::Mesh;
+use crate::compute::read;
+use crate::device::{Gpu, GpuError};
+use littoral::lod::{Mesh, Vertex};
 
 /// Triangles of a surface on the device.
 #[derive(Debug, Default)]
@@ -32,6 +33,29 @@ impl Triangles {
         Ok(())
     }
 
+    /// Brings a mesh to the device with room for so many vertices and triangles in all, the rest of which the device makes.
+    pub(crate) fn make(&mut self, gpu: &Gpu, mesh: &Mesh, [vertices, triangles]: [u64; 2]) {
+        let to = reserve(gpu, &mut self.vertices, "vertices", VERTICES, vertices * size_of::<Vertex>() as u64);
+        gpu.queue.write_buffer(to, 0, bytemuck::cast_slice(&mesh.vertices));
+        let to = reserve(gpu, &mut self.corners, "triangles", CORNERS, 12 * triangles);
+        gpu.queue.write_buffer(to, 0, bytemuck::cast_slice(&mesh.triangles));
+        let drawn = [3 * mesh.triangles.len() as u32, 1, 0, 0, 0];
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_SRC;
+        fill(gpu, &mut self.drawn, "draw", usage, bytemuck::cast_slice(&drawn));
+        self.count = 3 * triangles as u32;
+    }
+
+    /// So many vertices and triangles, read back.
+    pub(crate) fn read(&self, gpu: &Gpu, vertices: u32, triangles: u32) -> Result<Mesh, GpuError> {
+        let (Some(from), Some(corners)) = (&self.vertices, &self.corners) else { return Ok(Mesh::default()) };
+        let vertices = read(gpu, from, u64::from(vertices) * size_of::<Vertex>() as u64)?;
+        let corners = read(gpu, corners, 12 * u64::from(triangles))?;
+        Ok(Mesh {
+            vertices: bytemuck::pod_collect_to_vec(&vertices),
+            triangles: bytemuck::pod_collect_to_vec(&corners),
+        })
+    }
+
     /// How many triangles there are; how many there may be at most, if the device made them.
     pub fn len(&self) -> usize {
         self.count as usize / 3
@@ -55,14 +79,26 @@ pub struct TooMany {
     pub megabytes: u64,
 }
 
-const VERTICES: wgpu::BufferUsages = wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::STORAGE);
-const CORNERS: wgpu::BufferUsages = wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE);
+const VERTICES: wgpu::BufferUsages =
+    wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::STORAGE).union(wgpu::BufferUsages::COPY_SRC);
+const CORNERS: wgpu::BufferUsages =
+    wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE).union(wgpu::BufferUsages::COPY_SRC);
 
 /// Writes bytes into a buffer, making a new one half as large again where they do not fit.
 pub(crate) fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) {
-    let size = bytes.len() as u64;
+    gpu.queue.write_buffer(reserve(gpu, buffer, label, usage, bytes.len() as u64), 0, bytes);
+}
+
+/// A buffer of so many bytes at least: the one there is, or a new one half as large again.
+fn reserve<'a>(
+    gpu: &Gpu,
+    buffer: &'a mut Option<wgpu::Buffer>,
+    label: &str,
+    usage: wgpu::BufferUsages,
+    size: u64,
+) -> &'a wgpu::Buffer {
     let room = |buffer: &wgpu::Buffer| buffer.size() >= size;
-    let buffer = match buffer.take().filter(room) {
+    match buffer.take().filter(room) {
         Some(kept) => buffer.insert(kept),
         None => buffer.insert(gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -70,6 +106,5 @@ pub(crate) fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, us
             usage: usage | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })),
-    };
-    gpu.queue.write_buffer(buffer, 0, bytes);
+    }
 }

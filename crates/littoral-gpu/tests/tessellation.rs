@@ -168,18 +168,18 @@ fn full_lists_raise_the_tolerance() {
             let case = Case { surface: &surface, view: &view, limits, label: &label };
             check(&mut on_device, &case, &mut random);
             let told = on_device.told.expect("told");
-            assert!(u64::from(told.cells) <= room, "{label}: {told:?}");
+            assert!(u64::from(told.looked_at) <= room, "{label}: {told:?}");
             let mut wanting = OnDevice::new(&gpu, &land, limits);
             wanting.select(&land, &view, &mut Drawing::default()).expect("a view");
             let wanted = wanting.told.expect("told");
-            if u64::from(wanted.cells) > room {
+            if u64::from(wanted.looked_at) > room {
                 full += 1;
                 // What there is room for is used.
                 assert!(
                     told.reached.pixels >= wanted.reached.pixels && told.reached.limited,
                     "{label}: {told:?} for {wanted:?}"
                 );
-                assert!(u64::from(told.cells) > room / 3, "{label}: {told:?}");
+                assert!(u64::from(told.looked_at) > room / 3, "{label}: {told:?}");
             } else {
                 assert_eq!(told, wanted, "{label}");
             }
@@ -206,7 +206,7 @@ fn views_and_lands_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn a_picture_of_patches_is_that_of_their_mesh() {
+fn a_picture_of_made_is_that_of_their_mesh() {
     let Some((gpu, _alone)) = gpu() else { return };
     let size = UVec2::new(96, 54);
     let land = coast::coast();
@@ -220,7 +220,7 @@ fn a_picture_of_patches_is_that_of_their_mesh() {
     let told = painter.tessellate(&land, limits, &shot.view).expect("a small land");
     assert_eq!(told.triangles as usize, drawing.mesh.triangles.len());
     assert!((told.reached.pixels - reached.pixels).abs() < 1e-3 * reached.pixels, "{told:?} for {reached:?}");
-    let patches = painter.picture_of_patches(&stage, &shot.view, 1, &|_| {}).expect("a picture");
+    let patches = painter.picture_of_made(&stage, &shot.view, 1, &|_| {}).expect("a picture");
     let mesh = painter.picture(&stage, Some(&drawing.mesh), &shot.view, 1, &|_| {}).expect("a picture");
     assert_eq!(patches.radiance, mesh.radiance);
     assert_eq!(patches.depth, mesh.depth);

@@ -99,6 +99,37 @@ fn the_coast_looks_as_rays_see_it() {
 }
 
 #[test]
+fn still_water_mirrors_cliffs_as_rays_do() {
+    let Some(gpu) = gpu() else { return };
+    let size = UVec2::new(256, 144);
+    let land = coast::coast();
+    let water = Water::flood(&land, 0.0);
+    let shot = coast_shot(size);
+    let scene = Scene::for_shot(&land, water.as_ref(), &shot);
+    let stage = Stage::new(&scene);
+    let eye = DVec3::new(3380.0, 560.0, 30.0);
+    let view = View::looking_at(eye, DVec3::new(3700.0, 900.0, 20.0), 0.785, size);
+    let settings = Settings { samples: 16, ..Settings::default() };
+    let expected = stage.render_sea(None, &view, &settings, &|_| {});
+    let painted = Painter::new(gpu, &stage).expect("a natural scene").picture(&stage, None, &view, 16, &|_| {});
+    let how = Display { exposure: Exposure::Grey(expected.grey()), ..Display::default() };
+    let [expected, painted] = [&expected, &painted.expect("a picture")].map(|picture| picture.display(&how));
+    // Below the cliffs, in tiles that are large enough for ripples to even out.
+    let tile = |shown: &[[u8; 3]], x: usize, y: usize| {
+        let rows = (y..y + 8).flat_map(|y| &shown[y * 256 + x..][..16]);
+        rows.flatten().map(|&v| f64::from(v)).sum::<f64>() / (3 * 16 * 8) as f64
+    };
+    let mut worst = 0.0f64;
+    for y in (80..136).step_by(8) {
+        for x in (0..176).step_by(16) {
+            worst = worst.max((tile(&expected, x, y) - tile(&painted, x, y)).abs());
+        }
+    }
+    eprintln!("what a cliff is mirrored as: {worst:.1} of 255 apart at most");
+    assert!(worst < 12.0, "{worst} of 255 apart");
+}
+
+#[test]
 fn waves_look_as_rays_see_them() {
     let Some(gpu) = gpu() else { return };
     let size = UVec2::new(256, 144);

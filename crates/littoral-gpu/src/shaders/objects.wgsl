@@ -1,7 +1,7 @@
 // Objects on land and water, lit where they are: the engine's `picture::things`.
 
 // What was drawn so far: radiance and distance, 0 for the sky.
-@group(0) @binding(1) var behind_map: texture_2d<f32>;
+@group(0) @binding(20) var behind_map: texture_2d<f32>;
 
 struct Corner {
     @location(0) position: vec3f,
@@ -52,7 +52,11 @@ fn objects(seen: Seen, @builtin(front_facing) faces: bool) -> @location(0) vec4f
     }
     // Seen from behind, it is the other side's.
     let normal = normalize(select(-seen.normal, seen.normal, faces));
-    var light = seen.albedo / PI * irradiance_at(seen.rel.xy, normal);
+    // What rises over the ground by a good part of the sky's grid sees past the relief that hides the sky from it.
+    let clear = 0.3 / min(frame.skylight.z, frame.skylight.w);
+    let over = frame.eye.z + seen.rel.z - mean_of(sample_of(seen.rel.xy), 0u);
+    let free = select(step_between(0.0, clear, over), 1.0, !is_within(sample_of(seen.rel.xy)));
+    var light = seen.albedo / PI * mix(irradiance_at(seen.rel.xy, normal), irradiance_open(normal), free);
     let facing = dot(normal, frame.sun.xyz);
     if facing > 0.0 {
         let step = clamp(seen.step, 0.0, 3.0);

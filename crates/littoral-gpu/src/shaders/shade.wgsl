@@ -106,7 +106,16 @@ fn march(rel: vec2f, height: f32, direction: vec3f) -> f32 {
         }
         let level = u32(clamp(log2(0.06 * t / frame.eye.w), 0.0, f32(frame.has.x)));
         if mean_of(place, level) > height + direction.z * t && !is_cut_away(rel + direction.xy * t) {
-            return 0.5 * (last + t);
+            // Where among the samples: of a cliff its face is seen, and neither its foot nor its top.
+            for (var k = 0; k < 8; k++) {
+                let middle = 0.5 * (last + t);
+                if mean_of(sample_of(rel + direction.xy * middle), 0u) > height + direction.z * middle {
+                    t = middle;
+                } else {
+                    last = middle;
+                }
+            }
+            return t;
         }
         last = t;
         t = t * 1.19 + 0.5 * frame.eye.w;

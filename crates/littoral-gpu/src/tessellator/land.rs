@@ -1,5 +1,6 @@
 //! What a land says about its cells, as textures.
 
+use crate::compute::{heights, numbers};
 use crate::device::Gpu;
 use crate::scenery::TooLarge;
 use glam::DVec2;
@@ -19,7 +20,7 @@ pub(super) struct DeviceLand {
     pub rows: u32,
     /// Height (m) of step 0, and of a step, of the ranges.
     pub scale: (f32, f32),
-    /// Bits of the heights, [`VOID`] where there is none.
+    /// Bits of the heights, not finite where there is none.
     pub heights: wgpu::Texture,
     /// Two numbers a cell: its range in steps (low in the lower half) and the bits of its error. The first texture holds the levels [`TOGETHER`], one after the other from west to
     /// east, the others one each. Cells between four samples are told by these.
@@ -31,34 +32,15 @@ const TOGETHER: u8 = 6;
 
 const CELLS: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 
-/// A height that is not finite.
-const VOID: u32 = f32::INFINITY.to_bits();
-
-/// Bytes that are brought to the device together.
-const BAND: usize = 32 << 20;
-
 impl DeviceLand {
     pub fn new(gpu: &Gpu, land: &Land) -> Result<DeviceLand, TooLarge> {
+        let heights = heights(gpu, land)?;
         let raster = land.raster();
         let (columns, rows) = (raster.columns(), raster.rows());
-        let most = gpu.device.limits().max_texture_dimension_2d;
-        if columns.max(rows) > most as usize {
-            return Err(TooLarge { columns, rows, most });
-        }
         let finest = land.finest_level();
-        let heights =
-            texture(gpu, "heights", wgpu::TextureFormat::R32Uint, columns, rows, |row, line: &mut Vec<u32>| {
-                let first = row * columns;
-                line.extend(
-                    raster.heights()[first..first + columns]
-                        .iter()
-                        .enumerate()
-                        .map(|(i, height)| if raster.voids().is_void(first + i) { VOID } else { height.to_bits() }),
-                );
-            });
         let first = TOGETHER.min(finest);
         let width = (1usize << first) - 1;
-        let together = texture(gpu, "first cells", CELLS, width.max(1), width.div_ceil(2).max(1), |row, line| {
+        let together = numbers(gpu, "first cells", CELLS, width.max(1), width.div_ceil(2).max(1), |row, line| {
             let begin = line.len();
             for level in 0..first {
                 line.resize(begin + 2 * ((1 << level) - 1), 0);
@@ -68,7 +50,7 @@ impl DeviceLand {
         });
         let of_level = |level| {
             let (columns, rows) = land.ranges().size(u32::from(finest - level));
-            texture(gpu, "cells", CELLS, columns, rows, |row, line| ranges_and_errors(land, level, row, line))
+            numbers(gpu, "cells", CELLS, columns, rows, |row, line| ranges_and_errors(land, level, row, line))
         };
         let cells = std::iter::once(together).chain((first..finest).map(of_level)).collect();
         let origin = land.origin();
@@ -107,56 +89,4 @@ fn ranges_and_errors(land: &Land, level: u8, row: usize, line: &mut Vec<u32>) {
     line.extend(
         steps.zip(&errors).flat_map(|((&low, &high), error)| [u32::from(low) | u32::from(high) << 16, error.to_bits()]),
     );
-}
-
-/// A texture of 32-bit numbers; `fill` appends those of a row.
-fn texture(
-    gpu: &Gpu,
-    label: &str,
-    format: wgpu::TextureFormat,
-    columns: usize,
-    rows: usize,
-    mut fill: impl FnMut(usize, &mut Vec<u32>),
-) -> wgpu::Texture {
-    let size = wgpu::Extent3d { width: columns as u32, height: rows as u32, depth_or_array_layers: 1 };
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size,
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
-    let mut numbers = Vec::new();
-    let mut first = 0;
-    for row in 0..rows {
-        fill(row, &mut numbers);
-        let bytes = size_of_val(&numbers[..]);
-        if bytes < BAND && row + 1 < rows {
-            continue;
-        }
-        let count = row + 1 - first;
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                texture: &texture,
-                mip_level: 0,
-                origin: wgpu::Origin3d { x: 0, y: first as u32, z: 0 },
-                aspect: wgpu::TextureAspect::All,
-            },
-            bytemuck::cast_slice(&numbers),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some((bytes / count) as u32),
-                rows_per_image: None,
-            },
-            wgpu::Extent3d { height: count as u32, ..size },
-        );
-        // What was written is on its way: its copy on the processor is let go.
-        gpu.queue.submit([]);
-        numbers.clear();
-        first = row + 1;
-    }
-    texture
 }

@@ -170,9 +170,8 @@ impl Drawing {
         self.patches.len() * each + strips + self.mesh.triangles.len()
     }
 
-    /// Turns the patches into triangles of the mesh, with heights of `field`, and removes them; so it does with strips. Triangles that would reach into a
-    /// void are left out.
-    pub fn expand(&mut self, field: &dyn HeightField) {
+    /// Turns the strips into triangles of the mesh, and removes them.
+    pub fn expand_strips(&mut self) {
         let mut begin = 0;
         for end in self.strips.drain(..) {
             let vertices = &self.mesh.vertices;
@@ -184,6 +183,12 @@ impl Drawing {
             }));
             begin = end;
         }
+    }
+
+    /// Turns the patches into triangles of the mesh, with heights of `field`, and removes them; so it does with strips. Triangles that would reach into a
+    /// void are left out.
+    pub fn expand(&mut self, field: &dyn HeightField) {
+        self.expand_strips();
         let n = match self.stencil {
             Stencil::Square(n) => n,
             Stencil::Triangle => 1,

@@ -142,7 +142,9 @@ impl Stage<'_> {
     /// An object's light.
     pub(super) fn object(&self, lens: &Lens, look: &Look, thing: &Thing) -> Shaded {
         let Thing { position, normal, albedo } = *thing;
-        let sky = irradiance(&self.skylight.at(position.truncate()), normal);
+        let at = position.truncate();
+        let over = self.ground.land.height_at(at).map_or(f32::INFINITY, |ground| position.z as f32 - ground);
+        let sky = irradiance(&self.skylight.above(at, over), normal);
         let mut shaded = Shaded { light: albedo / PI * sky, ..Shaded::default() };
         let facing = normal.dot(self.sun);
         if facing > 0.0 {

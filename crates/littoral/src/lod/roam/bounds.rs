@@ -77,6 +77,8 @@ pub struct NestedBounds {
     pub(super) step: f32,
     /// Samples a side: 2ᵏ + 1.
     side: usize,
+    /// Samples of the land, eastward and northward.
+    samples: [u32; 2],
     /// Heights (m), row by row; NaN where void.
     heights: Vec<f32>,
     voids: bool,
@@ -199,8 +201,9 @@ impl NestedBounds {
         let base = low - 2.0 * step;
         let voids = heights.iter().any(|height| height.is_nan());
         let levels = vec![Level::default(); usize::from(finest) + 1];
-        let mut bounds =
-            NestedBounds { datum: land.datum(), finest, base, step, side, heights, voids, levels, slopes: Vec::new() };
+        let samples = [columns as u32, rows as u32];
+        let (datum, slopes) = (land.datum(), Vec::new());
+        let mut bounds = NestedBounds { datum, finest, base, step, side, samples, heights, voids, levels, slopes };
         for level in (0..finest).rev() {
             let half = Diamond::ROOT.half >> level;
             let of = |bounds: &NestedBounds, i, j| bounds.measure(land, Diamond::at([i * half, j * half]));
@@ -229,6 +232,35 @@ impl NestedBounds {
     /// The level of the samples.
     pub fn finest(&self) -> u8 {
         self.finest
+    }
+
+    /// Samples of the land, eastward and northward.
+    pub fn samples(&self) -> [u32; 2] {
+        self.samples
+    }
+
+    /// Height of step 0 and of one step (m), in which [`NestedBounds::packed`] counts.
+    pub fn scale(&self) -> (f32, f32) {
+        (self.base, self.step)
+    }
+
+    /// Height (m) of a sample, column and row from the south-west; NaN where void.
+    ///
+    /// # Panics
+    /// If it is not one of the face's 2ᵏ + 1 a side.
+    pub fn sample_height(&self, column: u32, row: u32) -> f32 {
+        self.heights[row as usize * self.side + column as usize]
+    }
+
+    /// What is known of the diamond whose middle is a sample, as devices keep it: the bits of its deviation (m), rounded up to a multiple of sixteen, with two marks for which of its
+    /// triangles have surface under all of them and two for which have none; and its lowest and highest height (steps), the lowest in the
+    /// lower half, which is the greater of the two where there is none. The face's corners have no diamonds.
+    ///
+    /// # Panics
+    /// If it is a corner, or not one of the face's 2ᵏ + 1 samples a side.
+    pub fn packed(&self, column: u32, row: u32) -> [u32; 2] {
+        let bound = *self.slot(Diamond::at([column, row].map(|c| c << (Cell::MAX_LEVEL - self.finest))));
+        [bound.bits, u32::from(bound.low) | u32::from(bound.high) << 16]
     }
 
     /// Whether any of it is void.
