@@ -28,8 +28,7 @@ pub struct Detail {
     /// Draw the mesh's edges, too
     #[arg(long, requires = "lod", conflicts_with = "gpu", help_heading = "Mesh")]
     pub wireframe: bool,
-    /// Draw on the graphics card (or what stands for one), everything but shaded relief: the exact surface by rays, or the
-    /// mesh of --lod
+    /// Draw on the graphics card (or what stands for one): the exact surface by rays, or the mesh of --lod
     #[arg(long, conflicts_with = "passes", help_heading = "Mesh")]
     pub gpu: bool,
     /// Choose the mesh for an eye at this place that looks at the same point, and look at it from --eye

@@ -28,9 +28,9 @@ pub struct Scenery {
 impl Scenery {
     /// Of a stage, seen from a height (m). What cannot be drawn in full is drawn plainly; the sentence says why.
     pub fn new(gpu: &Gpu, stage: &Stage<'_>, height: f64) -> (Scenery, Option<String>) {
-        let full = match (stage.tables(), stage.land().datum()) {
-            (Some(tables), Datum::Plane { origin, size }) => {
-                littoral_gpu::Scenery::new(gpu, &tables, (origin, size), (height, &stage.sky_table(height)))
+        let full = match stage.land().datum() {
+            Datum::Plane { origin, size } => {
+                littoral_gpu::Scenery::new(gpu, &stage.tables(), (origin, size), (height, &stage.sky_table(height)))
                     .map_err(|e| format!("{e}; drawn plainly"))
             }
             _ => Err("this land can only be drawn plainly".to_owned()),

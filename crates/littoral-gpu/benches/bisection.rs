@@ -21,14 +21,14 @@ use littoral::space::View;
 use littoral_gpu::{Bisector, Gpu};
 use std::hint::black_box;
 use std::time::Instant;
-use timer::{Timer, wait};
+use timer::wait;
 
 /// Frames that are measured.
 const FRAMES: usize = 61;
 
 fn main() {
     let gpu = match Gpu::headless() {
-        Ok(gpu) => gpu,
+        Ok(gpu) => gpu.timed(),
         Err(error) => return println!("{error}"),
     };
     println!("{} ({:?})", gpu.adapter.name, gpu.adapter.backend);
@@ -65,19 +65,18 @@ fn fly(gpu: &Gpu, land: &Land, bounds: &NestedBounds, limits: Limits, speed: f64
         Err(error) => return println!("{error}"),
     };
     wait(gpu);
-    let timer = Timer::new(gpu);
     let (mut alone, mut ticks) = (Vec::new(), Vec::new());
     for frame in 0..=FRAMES {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let view = view(land, speed, frame);
-        let refused = bisector.bisect(gpu, &mut encoder, &view, timer.as_ref().map(Timer::writes));
+        let refused = bisector.bisect(gpu, &mut encoder, &view, timer::writes(gpu));
         refused.expect("a view that is one");
         let commands = encoder.finish();
         let start = Instant::now();
         gpu.queue.submit([commands]);
         wait(gpu);
         alone.push(start.elapsed().as_secs_f64() * 1e3);
-        ticks.push(timer.as_ref().map_or(0.0, |timer| timer.read(gpu)));
+        ticks.push(timer::read(gpu).unwrap_or(0.0));
     }
     let told = match bisector.read(gpu) {
         Ok(told) => told,
@@ -110,7 +109,8 @@ fn fly(gpu: &Gpu, land: &Land, bounds: &NestedBounds, limits: Limits, speed: f64
     let first = (alone.remove(0), flown.remove(0));
     ticks.remove(0);
     let alone = median(alone);
-    let clock = if timer.is_some() { format!("{:.3} ms by its clock", median(ticks)) } else { "no clock".to_owned() };
+    let clock =
+        if gpu.times.is_some() { format!("{:.3} ms by its clock", median(ticks)) } else { "no clock".to_owned() };
     println!(
         "  first {:.2} ms, then {alone:.3} ms alone, {clock}; on the processor {:.2} ms, then {:.3} ms, from scratch {:.2} ms; {:.2} MB at least: {:.1} GB/s",
         first.0,

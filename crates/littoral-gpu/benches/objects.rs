@@ -25,7 +25,7 @@ fn main() {
     let objects = field(&water, &view);
     let scene = Scene { objects: &objects, ..Scene::for_shot(&land, Some(&water), &shot) };
     let stage = Stage::new(&scene);
-    let tables = stage.tables().expect("natural colours");
+    let tables = stage.tables();
     let sky = (view.eye.z, &stage.sky_table(view.eye.z));
     let datum = (stage.land().origin(), stage.land().extent());
     let scenery = || Scenery::new(&gpu, &tables, datum, sky).expect("it fits");

@@ -5,13 +5,15 @@
 //! and what the adapter's own clock says where it has one; medians. The bytes are what must be moved at least: each sample read once, each pixel's depth
 //! written, and for the pyramid each node written and read once. Over the time and the memory's speed they are the part of what is possible.
 
+mod timer;
+
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::noise::Fbm;
 use littoral::field::{HeightField, Land, Raster};
 use littoral::picture::{Scene, Stage};
 use littoral::raycast::LocalRay;
 use littoral::space::{Datum, View};
-use littoral_gpu::{Gpu, Ground, Look, PassTimes, Renderer, Scenery, ShapeTexture};
+use littoral_gpu::{Gpu, Ground, Look, Renderer, Scenery, ShapeTexture};
 use std::time::Instant;
 
 /// Side of the map (m).
@@ -21,7 +23,7 @@ const RUNS: usize = 15;
 
 fn main() {
     let gpu = match Gpu::headless() {
-        Ok(gpu) => gpu,
+        Ok(gpu) => gpu.timed(),
         Err(error) => return println!("{error}"),
     };
     let (size, sides) = match gpu.is_software() {
@@ -47,7 +49,7 @@ fn map(gpu: &Gpu, side: usize, size: UVec2) {
     let samples = (side * side) as f64;
     println!("map of {side} × {side}");
 
-    let wait = || drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
+    let wait = || timer::wait(gpu);
     let built = median(|| {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         shape.build(&mut encoder);
@@ -59,22 +61,19 @@ fn map(gpu: &Gpu, side: usize, size: UVec2) {
     println!("  pyramid: {:.3} ms for {:.1} MB, {:.2} GB/s", built.0, 1e-6 * bytes, 1e-6 * bytes / built.0);
 
     let stage = Stage::new(&Scene::new(&land, None));
-    let tables = stage.tables().expect("natural colours");
+    let tables = stage.tables();
     let Datum::Plane { origin, size: extent } = land.datum() else { return };
     let sky = stage.sky_table(eye.z);
     let scenery = Scenery::new(gpu, &tables, (origin, extent), (eye.z, &sky)).expect("a map that fits");
     let mut renderer = Renderer::new(gpu, wgpu::TextureFormat::Rgba8Unorm);
-    renderer.times = PassTimes::new(gpu);
     for (name, pixels) in [("exact", 0.0), ("by cones of a pixel", 1.0)] {
         let (wall, pass) = median(|| {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let ground = Ground::Rays { shape: &shape, pixels };
             renderer.distances(gpu, &mut encoder, &scenery, ground, &view, Look::default());
-            let times = renderer.times.as_ref();
-            times.inspect(|times| times.keep(&mut encoder));
             gpu.queue.submit([encoder.finish()]);
             wait();
-            times.map_or(0.0, |times| times.read(gpu).map_or(0.0, |passes| passes[0]))
+            timer::read(gpu).unwrap_or(0.0)
         });
         let rays = f64::from(size.x * size.y);
         let bytes = 4.0 * (samples.min(4.0 * rays) + rays);

@@ -4,6 +4,8 @@
 //! (those it makes here too); wall time from before the work is submitted until it is done; medians; both alternate within one process.
 //! The bytes are what the passes read and write as they are built: over the time and the memory's speed they are the part of what is possible.
 
+mod timer;
+
 use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::{Motion, Points, SeaState, WaveModel};
 use littoral_gpu::sea::Transform;
@@ -14,7 +16,7 @@ use std::time::Instant;
 
 fn main() {
     let gpu = match Gpu::headless() {
-        Ok(gpu) => gpu,
+        Ok(gpu) => gpu.timed(),
         Err(error) => return println!("{error}"),
     };
     println!("{} ({:?})", gpu.adapter.name, gpu.adapter.backend);
@@ -40,18 +42,19 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
     let mut sea = Cascades::with_tiles(&state, &tiles, &options).expect("a sea");
     let mut on_gpu =
         [Transform::Passes, Transform::Lines].map(|of| GpuSea::with_transform(gpu, &sea, of).expect("a sea"));
-    let wait = || drop(gpu.device.poll(wgpu::PollType::wait_indefinitely()));
+    let wait = || timer::wait(gpu);
     wait();
-    let mut times = [const { Vec::new() }; 6];
+    let mut times = [const { Vec::new() }; 8];
     // The first frames warm up. A tick of foam comes every 15 frames.
     for frame in 0..34 {
         let now = 100.0 + f64::from(frame) / 60.0;
-        let mut taken = [0.0; 6];
-        for (taken, sea) in taken.iter_mut().zip(&mut on_gpu) {
-            *taken = milliseconds(|| {
+        let mut taken = [0.0; 8];
+        for (number, sea) in on_gpu.iter_mut().enumerate() {
+            taken[number] = milliseconds(|| {
                 sea.set_time(now);
                 wait();
             });
+            taken[6 + number] = timer::read(gpu).unwrap_or(0.0);
         }
         // Until the next is submitted the processor is free.
         taken[2] = milliseconds(|| on_gpu[1].set_time(now + 1e-3));
@@ -75,14 +78,16 @@ fn steps(gpu: &Gpu, samples: usize, foam: bool) {
             times.iter_mut().zip(taken).for_each(|(times, taken)| times.push(taken));
         }
     }
-    let [passes, lines, recording, alone, with_levels, copied] = times.map(|mut times| {
+    let [passes, lines, recording, alone, with_levels, copied, passes_alone, lines_alone] = times.map(|mut times| {
         times.sort_by(f64::total_cmp);
         times[times.len() / 2]
     });
     println!("3 × {samples}²{}", if foam { ", foam" } else { "" });
-    for (name, sea, time) in [("passes", &on_gpu[0], passes), ("lines", &on_gpu[1], lines)] {
+    let ways = [("passes", &on_gpu[0], passes, passes_alone), ("lines", &on_gpu[1], lines, lines_alone)];
+    for (name, sea, time, alone) in ways {
         let bytes = sea.bytes_moved() as f64;
-        println!("  by {name}: {time:.2} ms for {:.1} MB, {:.2} GB/s", 1e-6 * bytes, 1e-6 * bytes / time);
+        let clock = if alone > 0.0 { format!("{alone:.3} ms by the adapter's clock, ") } else { String::new() };
+        println!("  by {name}: {time:.2} ms for {:.1} MB, {clock}{:.2} GB/s", 1e-6 * bytes, 1e-6 * bytes / time);
     }
     println!(
         "  to record and submit {recording:.2} ms; on the processor {alone:.2} ms, with levels {with_levels:.2} ms, and {copied:.2} ms to copy its samples"

@@ -16,9 +16,9 @@ mod timer;
 
 use littoral::lod::{Drawing, Limits, Lod, Patches};
 use littoral::space::View;
-use littoral_gpu::{Gpu, Tessellator};
+use littoral_gpu::{Gpu, TessellationPasses, Tessellator};
 use std::time::Instant;
-use timer::{Timer, wait};
+use timer::wait;
 
 /// Frames that are measured, after a few that warm up.
 const FRAMES: usize = 31;
@@ -27,7 +27,7 @@ const ROW: u32 = 16;
 
 fn main() {
     let gpu = match Gpu::headless() {
-        Ok(gpu) => gpu,
+        Ok(gpu) => gpu.timed(),
         Err(error) => return println!("{error}"),
     };
     println!("{} ({:?})", gpu.adapter.name, gpu.adapter.backend);
@@ -36,12 +36,13 @@ fn main() {
     let columns = columns.next_power_of_two().clamp(1024, globe::COLUMNS);
     let land = globe::land(columns);
     let all = land.finest_level();
+    let passes = TessellationPasses::new(&gpu);
     println!("{columns} × {} samples", columns / 2);
     for (finest, tolerance) in [(all - 3, 1.0), (all, 1.0), (all, 0.25), (all, 0.02)] {
         let limits = Limits { finest, triangles: 1_000_000 };
         let view = globe::view(tolerance);
         let start = Instant::now();
-        let mut tessellator = match Tessellator::new(&gpu, &land, limits) {
+        let mut tessellator = match Tessellator::new(&gpu, &passes, &land, limits) {
             Ok(tessellator) => tessellator,
             Err(error) => return println!("{error}"),
         };
@@ -53,12 +54,11 @@ fn main() {
         select();
         let processor = clock::median(5, select);
 
-        let timer = Timer::new(&gpu);
         let mut times = [const { Vec::new() }; 3];
         for frame in 0..FRAMES + 4 {
-            let alone = submit(&gpu, &mut tessellator, &view, 1, timer.as_ref());
-            let ticks = timer.as_ref().map_or(0.0, |timer| timer.read(&gpu));
-            let in_a_row = submit(&gpu, &mut tessellator, &view, ROW, None) / f64::from(ROW);
+            let alone = submit(&gpu, &mut tessellator, &view, 1);
+            let ticks = timer::read(&gpu).unwrap_or(0.0);
+            let in_a_row = submit(&gpu, &mut tessellator, &view, ROW) / f64::from(ROW);
             if frame >= 4 {
                 times.iter_mut().zip([alone, in_a_row, ticks]).for_each(|(times, taken)| times.push(taken));
             }
@@ -81,7 +81,7 @@ fn main() {
             drawing.triangles(),
             told.looked_at,
         );
-        let clock = if timer.is_some() { format!("{ticks:.3} ms by its clock") } else { "no clock".to_owned() };
+        let clock = if gpu.times.is_some() { format!("{ticks:.3} ms by its clock") } else { "no clock".to_owned() };
         println!(
             "  {alone:.3} ms alone, {in_a_row:.3} ms in a row, {clock}; on the processor {:.3} ms; {:.2} MB at least: {:.1} GB/s in a row",
             processor * 1e3,
@@ -91,12 +91,12 @@ fn main() {
     }
 }
 
-/// Milliseconds from before a number of tessellations are submitted until they are done.
-fn submit(gpu: &Gpu, tessellator: &mut Tessellator, view: &View, number: u32, timer: Option<&Timer>) -> f64 {
+/// Milliseconds from before a number of tessellations are submitted until they are done. One alone is timed by the device's clock, too.
+fn submit(gpu: &Gpu, tessellator: &mut Tessellator, view: &View, number: u32) -> f64 {
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     for _ in 0..number {
-        let refused = tessellator.tessellate(gpu, &mut encoder, view, timer.map(Timer::writes));
-        refused.expect("a view that the processor took");
+        let timestamps = if number == 1 { timer::writes(gpu) } else { None };
+        tessellator.tessellate(gpu, &mut encoder, view, timestamps).expect("a view that the processor took");
     }
     let commands = encoder.finish();
     let start = Instant::now();

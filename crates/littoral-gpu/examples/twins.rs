@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     lod.select(field, &view, &mut drawing)?;
     drawing.expand(field);
     let begin = Instant::now();
-    let tables = stage.tables().ok_or("expected a natural scene")?;
+    let tables = stage.tables();
     println!("tables in {:.0} ms", begin.elapsed().as_secs_f64() * 1e3);
     let Datum::Plane { origin, size: extent } = field.datum() else { return Err("expected a plane".into()) };
     let scenery = Scenery::new(&gpu, &tables, (origin, extent), (view.eye.z, &stage.sky_table(view.eye.z)))?;

@@ -1,29 +1,19 @@
 //! What all compute passes need: layouts and groups of bindings, textures of numbers, buffers read back.
 
+use crate::bindings;
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use littoral::field::Land;
 
 /// A texture of whole numbers that is read texel by texel.
-pub(crate) const TEXELS: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Uint,
-    view_dimension: wgpu::TextureViewDimension::D2,
-    multisampled: false,
-};
+pub(crate) const TEXELS: wgpu::BindingType = bindings::numbers();
 
 pub(crate) fn binding(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }
 
 pub(crate) fn layout(device: &wgpu::Device, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
-    let entry = |(binding, &ty): (u32, &wgpu::BindingType)| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty,
-        count: None,
-    };
-    let entries: Vec<_> = (0..).zip(types).map(entry).collect();
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("compute"), entries: &entries })
+    bindings::group_layout(device, "compute", wgpu::ShaderStages::COMPUTE, types)
 }
 
 pub(crate) fn bind(
@@ -31,12 +21,7 @@ pub(crate) fn bind(
     layout: &wgpu::BindGroupLayout,
     resources: Vec<wgpu::BindingResource>,
 ) -> wgpu::BindGroup {
-    let entries = (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("compute"),
-        layout,
-        entries: &entries.collect::<Vec<_>>(),
-    })
+    bindings::group(device, "compute", layout, resources)
 }
 
 /// The first bytes of a buffer.

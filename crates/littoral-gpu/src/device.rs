@@ -1,5 +1,6 @@
 //! A device for those who have none.
 
+use crate::times::PassTimes;
 use std::fmt::Write;
 use std::sync::{Arc, OnceLock};
 
@@ -12,6 +13,8 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// What does the work.
     pub adapter: wgpu::AdapterInfo,
+    /// Where passes leave how long they took.
+    pub times: Option<Arc<PassTimes>>,
     /// What went wrong first.
     fault: Arc<OnceLock<String>>,
 }
@@ -104,7 +107,22 @@ impl Gpu {
                 drop(lost.set(format!("device lost ({message})")));
             }
         });
-        Ok(Gpu { device, queue, adapter: info, fault })
+        Ok(Gpu { device, queue, adapter: info, times: None, fault })
+    }
+
+    /// The same device; what is made and recorded with this one tells how long its passes take, if the adapter has a clock for them.
+    pub fn timed(self) -> Gpu {
+        Gpu { times: PassTimes::new(&self).map(Arc::new), ..self }
+    }
+
+    /// What a compute pass of this name ([`PassTimes::PASSES`]) is told to write.
+    pub(crate) fn compute_times(&self, pass: &str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        self.times.as_ref().and_then(|times| times.of_compute(pass))
+    }
+
+    /// What a render pass of this name is told to write.
+    pub(crate) fn render_times(&self, pass: &str) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
+        self.times.as_ref().and_then(|times| times.of_render(pass))
     }
 
     /// Whether all that was asked for was done so far.
@@ -118,9 +136,9 @@ impl Gpu {
         }
     }
 
-    /// Whether the adapter is a processor that does a GPU's work.
+    /// Whether the adapter is a processor that does a GPU's work. That of tests, which does none, is taken for a graphics card.
     pub fn is_software(&self) -> bool {
-        self.adapter.device_type == wgpu::DeviceType::Cpu
+        self.adapter.device_type == wgpu::DeviceType::Cpu && self.adapter.backend != wgpu::Backend::Noop
     }
 }
 

@@ -6,6 +6,7 @@ use littoral::field::Finest;
 use littoral::picture::Streaks;
 use littoral::space::View;
 
+use crate::bindings;
 use crate::scenery::Scenery;
 
 /// One noise: from metres to its own coordinates, and where the eye is in those.
@@ -172,6 +173,11 @@ fn noises(spacing: f64, finest: Finest, time: f64) -> Vec<Sound> {
     all
 }
 
+/// The layout of the group that says to every shader of a picture what the frame is: a uniform buffer of [`Uniforms`].
+pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    bindings::group_layout(device, "frame", wgpu::ShaderStages::VERTEX_FRAGMENT, &[bindings::uniform(false)])
+}
+
 impl Uniforms {
     /// A scenery as a view sees it.
     pub fn new(scenery: &Scenery, view: &View, look: Look) -> Uniforms {
@@ -216,7 +222,7 @@ impl Uniforms {
         }
         let level = scenery.level.map_or(0.0, |level| (level - eye.z) as f32);
         let drape = scenery.coat.uv_from_eye(flat);
-        let is_map = scenery.coat.kind == 1.0;
+        let is_map = scenery.coat.is_map();
         let flag = |yes: bool| f32::from(u8::from(yes));
         Uniforms {
             clip_from_eye: clip_from_eye.to_cols_array(),

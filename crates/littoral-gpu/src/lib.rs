@@ -9,6 +9,7 @@
 //!
 //! [`GpuSea`] sums the waves of a sea of tiles, for shaders to ask about any place.
 
+mod bindings;
 mod bisector;
 mod coat;
 mod compute;
@@ -37,7 +38,7 @@ pub use rays::{ShapeError, ShapeTexture};
 pub use renderer::{Ground, Renderer, SHADERS};
 pub use scenery::{Scenery, TooLarge};
 pub use sea::GpuSea;
-pub use tessellator::{TESSELLATION_SHADERS, Tessellated, Tessellator};
+pub use tessellator::{TESSELLATION_SHADERS, Tessellated, TessellationPasses, Tessellator};
 pub use times::PassTimes;
 pub use triangles::{TooMany, Triangles};
 pub use waves::{Waves, WavesError, wave_shaders};

@@ -2,10 +2,10 @@
 //!
 //! They are drawn after everything else was lit, before and behind it by distance, and lit by themselves: into the same light and air, in one pass.
 
-use crate::Gpu;
 use crate::renderer::{DEPTH, RADIANCE, drawable, onto};
-use crate::scenery::Scenery;
+use crate::scenery::{self, Scenery};
 use crate::triangles::fill;
+use crate::{Gpu, bindings, frame};
 use bytemuck::{Pod, Zeroable};
 use glam::UVec2;
 use littoral::objects::{Corner, Object};
@@ -169,9 +169,11 @@ impl ObjectPass {
                 attributes: &placed,
             }),
         ];
-        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        let device = &gpu.device;
+        let groups = [&frame::layout(device), &scenery::layout(device), &behind_layout(device)];
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("objects"),
-            layout: None,
+            layout: Some(&bindings::pipeline_layout(device, "objects", &groups)),
             vertex: wgpu::VertexState {
                 module,
                 entry_point: Some("place"),
@@ -204,12 +206,11 @@ impl ObjectPass {
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
-        frame: (&wgpu::Buffer, &wgpu::Sampler, &View),
+        (frame, view): (&wgpu::BindGroup, &View),
         scenery: &Scenery,
         radiance: &wgpu::Texture,
         depth: &wgpu::TextureView,
     ) {
-        let (uniforms, sampler, view) = frame;
         let seen = scenery.objects.seen(view);
         self.triangles = 0;
         if seen.is_empty() {
@@ -224,29 +225,9 @@ impl ObjectPass {
             .behind
             .insert(kept.unwrap_or_else(|| drawable(gpu, "behind", size, RADIANCE, wgpu::TextureUsages::COPY_DST)));
         encoder.copy_texture_to_texture(radiance.as_image_copy(), behind.as_image_copy(), radiance.size());
-        let textures = [
-            (20, &*behind),
-            (1, &scenery.fine),
-            (2, &scenery.coarse),
-            (7, &scenery.eye_light),
-            (8, &scenery.eye_through),
-            (10, &scenery.skylight),
-            (11, &scenery.media),
-        ]
-        .map(|(binding, texture)| (binding, texture.create_view(&Default::default())));
-        let mut entries = vec![
-            wgpu::BindGroupEntry { binding: 0, resource: uniforms.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 6, resource: wgpu::BindingResource::Sampler(sampler) },
-        ];
-        entries.extend(textures.iter().map(|(binding, view)| wgpu::BindGroupEntry {
-            binding: *binding,
-            resource: wgpu::BindingResource::TextureView(view),
-        }));
-        let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("objects"),
-            layout: &self.pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        });
+        let behind = behind.create_view(&Default::default());
+        let behind = [wgpu::BindingResource::TextureView(&behind)];
+        let behind = bindings::group(&gpu.device, "behind", &behind_layout(&gpu.device), behind);
         let target = radiance.create_view(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("objects"),
@@ -260,7 +241,9 @@ impl ObjectPass {
         });
         let Some(instances) = &self.instances else { return };
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &bound, &[]);
+        for (number, group) in (0..).zip([frame, &scenery.group, &behind]) {
+            pass.set_bind_group(number, group, &[]);
+        }
         pass.set_vertex_buffer(1, instances.slice(..));
         let mut first = 0;
         for (&(model, form), of_it) in &seen {
@@ -274,4 +257,10 @@ impl ObjectPass {
             first = next;
         }
     }
+}
+
+/// What was drawn before objects.
+fn behind_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let types = [bindings::texels(wgpu::TextureViewDimension::D2)];
+    bindings::group_layout(device, "behind", wgpu::ShaderStages::FRAGMENT, &types)
 }

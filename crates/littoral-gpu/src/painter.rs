@@ -1,6 +1,7 @@
 //! Pictures without a window.
 
 use crate::bisector::Bisector;
+use crate::coat::PICTURE_BYTES;
 use crate::device::{Gpu, GpuError};
 use crate::expander::Expander;
 use crate::frame::Look;
@@ -8,7 +9,7 @@ use crate::objects::TooManyObjects;
 use crate::rays::{ShapeError, ShapeTexture};
 use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
-use crate::tessellator::{Tessellated, Tessellator};
+use crate::tessellator::{Tessellated, TessellationPasses, Tessellator};
 use crate::triangles::{TooMany, Triangles};
 use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
@@ -25,6 +26,8 @@ pub struct Painter {
     scenery: Scenery,
     triangles: Triangles,
     shape: Option<ShapeTexture>,
+    /// Made when the first land is tessellated.
+    tessellation: Option<TessellationPasses>,
     /// What made triangles last.
     maker: Option<Maker>,
     white: [f32; 3],
@@ -92,11 +95,9 @@ pub enum PainterError {
     #[error(transparent)]
     Objects(#[from] TooManyObjects),
     /// Something that it does not draw.
-    #[error(
-        "expected land on a plane in natural colours, tints or a picture, got {got}: the GPU does not draw that yet; draw it on the processor"
-    )]
+    #[error("expected land on a plane, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
-        /// What the stage shows.
+        /// What the stage stands on.
         got: &'static str,
     },
 }
@@ -105,16 +106,23 @@ impl Painter {
     /// A painter of a stage.
     ///
     /// # Errors
-    /// If the stage is a shaded relief, stands on an ellipsoid, or is larger than the device's textures.
+    /// If the stage stands on an ellipsoid, or is larger than the device's textures.
     pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
-        let Some(tables) = stage.tables() else {
-            return Err(PainterError::Unknown { got: "a shaded relief" });
-        };
+        Painter::with_picture_bytes(gpu, stage, PICTURE_BYTES)
+    }
+
+    /// The same where a picture that is laid over the land may take so many bytes of the device (usually 256 MiB): see [`Scenery::with_picture_bytes`].
+    ///
+    /// # Errors
+    /// As [`Painter::new`].
+    pub fn with_picture_bytes(gpu: Gpu, stage: &Stage, bytes: u64) -> Result<Painter, PainterError> {
         let Datum::Plane { origin, size } = stage.land().datum() else {
             return Err(PainterError::Unknown { got: "an ellipsoid" });
         };
+        let tables = stage.tables();
         let height = f64::from(stage.land().height_range().high).max(2.0);
-        let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
+        let scenery =
+            Scenery::with_picture_bytes(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)), bytes)?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
         gpu.check()?;
         Ok(Painter {
@@ -123,6 +131,7 @@ impl Painter {
             scenery,
             triangles: Triangles::default(),
             shape: None,
+            tessellation: None,
             maker: None,
             white: tables.white,
             medium: tables.medium,
@@ -187,7 +196,10 @@ impl Painter {
     pub fn tessellate(&mut self, land: &Land, limits: Limits, view: &View) -> Result<Tessellated, PainterError> {
         let mut tessellator = match self.maker.take() {
             Some(Maker::Patches(kept, tessellator)) if kept == limits => tessellator,
-            _ => Tessellator::new(&self.gpu, land, limits)?,
+            _ => {
+                let passes = self.tessellation.get_or_insert_with(|| TessellationPasses::new(&self.gpu));
+                Tessellator::new(&self.gpu, passes, land, limits)?
+            }
         };
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         tessellator.tessellate(&self.gpu, &mut encoder, view, None)?;
@@ -256,9 +268,13 @@ impl Painter {
         if view.size.max_element() > most {
             return Err(PainterError::Picture { got: view.size, most });
         }
+        if view.size.min_element() == 0 {
+            return Ok(Picture::empty(view.size, view.eye));
+        }
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
+        self.scenery.bring_picture(gpu, stage, view, usize::MAX);
         let ground = match source {
             Source::Mesh(mesh) => {
                 self.triangles.set(gpu, mesh)?;

@@ -14,7 +14,9 @@
 //! Works this rests on: spec page 004, "The height map as a shape texture" (2015), with A. Tevs et al., "Maximum mipmaps", I3D 2008. Ranges hold the samples
 //! on a node's border, too, so that they bound the bilinear surface.
 
+use crate::bindings;
 use crate::device::{Gpu, GpuError};
+use crate::frame;
 use crate::read::read;
 use crate::renderer::DEPTH;
 use crate::scenery::TooLarge;
@@ -277,7 +279,7 @@ impl ShapeTexture {
         &'a self,
         gpu: &Gpu,
         pass: &mut wgpu::RenderPass<'a>,
-        frame: &wgpu::Buffer,
+        frame: &wgpu::BindGroup,
         view: &View,
         pixels: f32,
     ) {
@@ -287,13 +289,8 @@ impl ShapeTexture {
         let (_, right, _) = view.frame();
         let relief = self.relief(view.eye, pixels.max(0.0) * right.length());
         gpu.queue.write_buffer(&self.relief, 0, bytemuck::bytes_of(&relief));
-        let frame = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("frame"),
-            layout: &self.cast.get_bind_group_layout(0),
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: frame.as_entire_binding() }],
-        });
         pass.set_pipeline(&self.cast);
-        pass.set_bind_group(0, &frame, &[]);
+        pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, &self.seen, &[]);
         pass.draw(0..3, 0..1);
     }
@@ -392,9 +389,15 @@ fn compute_pipeline(device: &wgpu::Device, module: &wgpu::ShaderModule, entry: &
 }
 
 fn cast_pipeline(device: &wgpu::Device, module: &wgpu::ShaderModule) -> wgpu::RenderPipeline {
+    let shape = bindings::group_layout(
+        device,
+        "shape",
+        wgpu::ShaderStages::FRAGMENT,
+        &[bindings::uniform(false), bindings::texels(wgpu::TextureViewDimension::D2), bindings::storage(true)],
+    );
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("cast"),
-        layout: None,
+        layout: Some(&bindings::pipeline_layout(device, "cast", &[&frame::layout(device), &shape])),
         vertex: wgpu::VertexState {
             module,
             entry_point: Some("everywhere"),

@@ -1,15 +1,16 @@
 //! The passes of a picture: how far away surfaces are, the light of every pixel, and the screen.
 
+use crate::bindings;
 use crate::device::{Gpu, GpuError};
-use crate::frame::{Look, Uniforms};
+use crate::frame::{self, Look, Uniforms};
 use crate::objects::{OBJECT_SHADER, ObjectPass};
 use crate::rays::ShapeTexture;
-use crate::scenery::Scenery;
-use crate::times::PassTimes;
+use crate::scenery::{self, Scenery};
 use crate::triangles::Triangles;
-use crate::waves::{WavePass, Wet};
-use glam::UVec2;
+use crate::waves::{self, WavePass, Wet};
+use glam::{UVec2, Vec3};
 use littoral::lod::Vertex;
+use littoral::picture::Medium;
 use littoral::space::View;
 
 /// Every shader with its name, as it is compiled: for tests that need no device.
@@ -52,14 +53,19 @@ pub enum Ground<'a> {
     },
 }
 
-/// What a picture is drawn into before it is shown.
+/// What a picture is drawn into before it is shown, and what passes are bound to that read it.
 #[derive(Debug)]
 struct Canvas {
     size: UVec2,
     depth: wgpu::TextureView,
     radiance: wgpu::Texture,
-    /// Of no size where no waves were drawn yet.
+    light: wgpu::TextureView,
+    /// Of one pixel where no waves were drawn yet.
     wet: Wet,
+    /// How far away ground and sea are.
+    distances: wgpu::BindGroup,
+    /// The light, and how it is shown.
+    shown: wgpu::BindGroup,
 }
 
 /// Draws sceneries. Made once for a device and the format of what is drawn to.
@@ -70,12 +76,11 @@ pub struct Renderer {
     display: wgpu::RenderPipeline,
     wires: wgpu::RenderPipeline,
     format: wgpu::TextureFormat,
-    sampler: wgpu::Sampler,
     uniforms: wgpu::Buffer,
+    /// Those.
+    frame: wgpu::BindGroup,
     shown: wgpu::Buffer,
     canvas: Option<Canvas>,
-    /// Where pictures leave how long their passes took.
-    pub times: Option<PassTimes>,
     /// Made when the first waves are drawn.
     waves: Option<WavePass>,
     objects: ObjectPass,
@@ -100,7 +105,7 @@ impl Renderer {
         };
         let surface = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("surface"),
-            layout: None,
+            layout: Some(&bindings::pipeline_layout(device, "surface", &[&frame::layout(device)])),
             vertex: wgpu::VertexState {
                 module: &surface,
                 entry_point: Some("surface"),
@@ -120,10 +125,10 @@ impl Renderer {
             multiview_mask: None,
             cache: None,
         });
-        let everywhere = |label, module: &wgpu::ShaderModule, format: wgpu::TextureFormat| {
+        let everywhere = |label, module: &wgpu::ShaderModule, format: wgpu::TextureFormat, groups: &[_]| {
             device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(label),
-                layout: None,
+                layout: Some(&bindings::pipeline_layout(device, label, groups)),
                 vertex: wgpu::VertexState {
                     module,
                     entry_point: Some("everywhere"),
@@ -182,37 +187,33 @@ impl Renderer {
                 mapped_at_creation: false,
             })
         };
+        let uniforms = uniform("frame", size_of::<Uniforms>() as u64);
+        let frame = bindings::group(device, "frame", &frame::layout(device), [uniforms.as_entire_binding()]);
+        let lit = [
+            &frame::layout(device),
+            &scenery::layout(device),
+            &distances_layout(device),
+            &waves::run_up_layout(device),
+        ];
         Renderer {
             surface,
-            shade: everywhere("shade", &shade, RADIANCE),
-            display: everywhere("display", &display, format),
+            shade: everywhere("shade", &shade, RADIANCE, &lit),
+            display: everywhere("display", &display, format, &[&shown_layout(device)]),
             wires,
             format,
-            sampler: device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("smooth"),
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                mipmap_filter: wgpu::MipmapFilterMode::Linear,
-                ..Default::default()
-            }),
-            uniforms: uniform("frame", size_of::<Uniforms>() as u64),
+            uniforms,
+            frame,
             shown: uniform("shown", 32),
             canvas: None,
-            times: None,
             waves: None,
             objects: ObjectPass::new(gpu, &objects),
         }
     }
 
-    /// The canvas for pictures of a size.
-    fn canvas(&mut self, gpu: &Gpu, size: UVec2) -> &Canvas {
+    /// Makes the canvas for pictures of a size, if it is not that.
+    fn set_canvas(&mut self, gpu: &Gpu, size: UVec2) {
         let kept = self.canvas.take().filter(|canvas| canvas.size == size);
-        self.canvas.insert(kept.unwrap_or_else(|| {
-            let depth = drawable(gpu, "depth", size, DEPTH, wgpu::TextureUsages::empty());
-            let depth = depth.create_view(&Default::default());
-            let radiance = drawable(gpu, "radiance", size, RADIANCE, wgpu::TextureUsages::COPY_SRC);
-            Canvas { size, depth, radiance, wet: Wet::new(gpu, UVec2::ONE, DEPTH) }
-        }))
+        self.canvas = Some(kept.unwrap_or_else(|| Canvas::new(gpu, size, &self.shown)));
     }
 
     /// Records the first pass of a picture alone: how far away the ground is.
@@ -226,7 +227,7 @@ impl Renderer {
         look: Look,
     ) {
         gpu.queue.write_buffer(&self.uniforms, 0, bytemuck::bytes_of(&Uniforms::new(scenery, view, look)));
-        self.canvas(gpu, view.size);
+        self.set_canvas(gpu, view.size);
         let Some(canvas) = &self.canvas else { return };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surface"),
@@ -236,12 +237,12 @@ impl Renderer {
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             }),
-            timestamp_writes: self.times.as_ref().and_then(|times| times.of("surface")),
+            timestamp_writes: gpu.render_times("surface"),
             ..Default::default()
         });
         match ground {
-            Ground::Triangles(triangles) => self.surface(gpu, &mut pass, triangles),
-            Ground::Rays { shape, pixels } => shape.cast(gpu, &mut pass, &self.uniforms, view, pixels),
+            Ground::Triangles(triangles) => self.surface(&mut pass, triangles),
+            Ground::Rays { shape, pixels } => shape.cast(gpu, &mut pass, &self.frame, view, pixels),
         }
     }
 
@@ -258,60 +259,24 @@ impl Renderer {
         self.distances(gpu, encoder, scenery, ground, view, look);
         let Some(canvas) = &mut self.canvas else { return };
         if let Some(waves) = &scenery.waves {
-            let size = view.size.max(UVec2::ONE);
-            if (canvas.wet.depth.width(), canvas.wet.depth.height()) != (size.x, size.y) {
-                canvas.wet = Wet::new(gpu, size, DEPTH);
-            }
+            canvas.wet(gpu);
             let passes = self.waves.get_or_insert_with(|| WavePass::new(gpu, DEPTH));
             passes.draw(gpu, encoder, &self.uniforms, waves, scenery.land, view, &canvas.depth, &canvas.wet);
         }
 
-        let radiance = canvas.radiance.create_view(&Default::default());
-        let textures = [
-            &scenery.fine,
-            &scenery.coarse,
-            &scenery.known,
-            &scenery.coat.texture,
-            &scenery.horizon,
-            &scenery.eye_light,
-            &scenery.eye_through,
-            &scenery.land_light,
-            &scenery.skylight,
-            &scenery.media,
-            &scenery.basin,
-            &scenery.rim,
-            scenery.waves.as_ref().map_or(&scenery.basin, |waves| &waves.run_up.0),
-            &canvas.wet.depth,
-            &canvas.wet.seen,
-        ]
-        .map(|texture| texture.create_view(&Default::default()));
-        let mut entries = vec![
-            wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() },
-            wgpu::BindGroupEntry { binding: 6, resource: wgpu::BindingResource::Sampler(&self.sampler) },
-            wgpu::BindGroupEntry { binding: 15, resource: wgpu::BindingResource::TextureView(&canvas.depth) },
-        ];
-        let numbers = [1, 2, 3, 4, 5, 7, 8, 9, 10, 11, 12, 13, 14, 18, 19];
-        entries.extend(numbers.into_iter().zip(&textures).map(|(binding, view)| wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::TextureView(view),
-        }));
-        let everything = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("scenery"),
-            layout: &self.shade.get_bind_group_layout(0),
-            entries: &entries,
-        });
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shade"),
-            color_attachments: &[Some(onto(&radiance, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
-            timestamp_writes: self.times.as_ref().and_then(|times| times.of("shade")),
+            color_attachments: &[Some(onto(&canvas.light, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
+            timestamp_writes: gpu.render_times("shade"),
             ..Default::default()
         });
         pass.set_pipeline(&self.shade);
-        pass.set_bind_group(0, &everything, &[]);
+        for (number, group) in (0..).zip([&self.frame, &scenery.group, &canvas.distances, scenery.run_up()]) {
+            pass.set_bind_group(number, group, &[]);
+        }
         pass.draw(0..3, 0..1);
         drop(pass);
-        let frame = (&self.uniforms, &self.sampler, view);
-        self.objects.draw(gpu, encoder, frame, scenery, &canvas.radiance, &canvas.depth);
+        self.objects.draw(gpu, encoder, (&self.frame, view), scenery, &canvas.radiance, &canvas.depth);
     }
 
     /// How many triangles of objects were drawn last.
@@ -320,17 +285,12 @@ impl Renderer {
     }
 
     /// Records triangles, as far away as they are.
-    fn surface(&self, gpu: &Gpu, pass: &mut wgpu::RenderPass<'_>, ground: &Triangles) {
+    fn surface(&self, pass: &mut wgpu::RenderPass<'_>, ground: &Triangles) {
         let (Some(vertices), Some(corners), false) = (&ground.vertices, &ground.corners, ground.is_empty()) else {
             return;
         };
         pass.set_pipeline(&self.surface);
-        let frame = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("frame"),
-            layout: &self.surface.get_bind_group_layout(0),
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: self.uniforms.as_entire_binding() }],
-        });
-        pass.set_bind_group(0, &frame, &[]);
+        pass.set_bind_group(0, &self.frame, &[]);
         pass.set_vertex_buffer(0, vertices.slice(..));
         pass.set_index_buffer(corners.slice(..), wgpu::IndexFormat::Uint32);
         match &ground.drawn {
@@ -383,7 +343,7 @@ impl Renderer {
     }
 
     /// Records the pass that shows what was drawn last on a target of some size (pixels), the drawn picture stretched over all of it. `grey` is the radiance (kcd/m²) that is shown
-    /// as middle grey.
+    /// as middle grey, where the picture has an exposure.
     pub fn show(
         &self,
         gpu: &Gpu,
@@ -396,25 +356,21 @@ impl Renderer {
         let Some(canvas) = &self.canvas else { return };
         let stretch = canvas.size.as_vec2() / size.max(UVec2::ONE).as_vec2();
         let encodes = if self.format.is_srgb() { 1.0 } else { 0.0 };
-        let scale = scenery.balance * (0.30 / grey.max(1e-9));
-        let shown = [scale.x, scale.y, scale.z, 0.0, encodes, stretch.x, stretch.y, 0.0];
+        let grey = grey.max(1e-9);
+        let (medium, scale) = match scenery.medium {
+            Medium::Photograph => (0.0, scenery.balance * (0.30 / grey)),
+            Medium::Model => (1.0, scenery.balance * (0.18 / grey)),
+            Medium::Paper => (2.0, Vec3::ONE),
+        };
+        let shown = [scale.x, scale.y, scale.z, medium, encodes, stretch.x, stretch.y, 0.0];
         gpu.queue.write_buffer(&self.shown, 0, bytemuck::cast_slice(&shown));
-        let radiance = canvas.radiance.create_view(&Default::default());
-        let bound = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("display"),
-            layout: &self.display.get_bind_group_layout(0),
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&radiance) },
-                wgpu::BindGroupEntry { binding: 1, resource: self.shown.as_entire_binding() },
-            ],
-        });
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("display"),
             color_attachments: &[Some(onto(target, wgpu::LoadOp::Clear(wgpu::Color::BLACK)))],
             ..Default::default()
         });
         pass.set_pipeline(&self.display);
-        pass.set_bind_group(0, &bound, &[]);
+        pass.set_bind_group(0, &canvas.shown, &[]);
         pass.draw(0..3, 0..1);
     }
 
@@ -451,6 +407,51 @@ impl Renderer {
         let rows = mapped.chunks_exact(row as usize);
         Ok(rows.flat_map(|r| bytemuck::cast_slice::<u8, [f32; 4]>(&r[..width as usize * 16])).copied().collect())
     }
+}
+
+impl Canvas {
+    /// For pictures of a size; how they are shown is in a buffer.
+    fn new(gpu: &Gpu, size: UVec2, how: &wgpu::Buffer) -> Canvas {
+        let depth = drawable(gpu, "depth", size, DEPTH, wgpu::TextureUsages::empty());
+        let depth = depth.create_view(&Default::default());
+        let radiance = drawable(gpu, "radiance", size, RADIANCE, wgpu::TextureUsages::COPY_SRC);
+        let light = radiance.create_view(&Default::default());
+        let wet = Wet::new(gpu, UVec2::ONE, DEPTH);
+        let distances = distances(gpu, &depth, &wet);
+        let shown = bindings::group(
+            &gpu.device,
+            "display",
+            &shown_layout(&gpu.device),
+            [wgpu::BindingResource::TextureView(&light), how.as_entire_binding()],
+        );
+        Canvas { size, depth, radiance, light, wet, distances, shown }
+    }
+
+    /// Makes room for the sea in each pixel, if there is none yet.
+    fn wet(&mut self, gpu: &Gpu) {
+        let size = self.size.max(UVec2::ONE);
+        if self.wet.size != size {
+            self.wet = Wet::new(gpu, size, DEPTH);
+            self.distances = distances(gpu, &self.depth, &self.wet);
+        }
+    }
+}
+
+/// What the pass that shades is bound to of a canvas.
+fn distances(gpu: &Gpu, depth: &wgpu::TextureView, wet: &Wet) -> wgpu::BindGroup {
+    let views = [depth, &wet.depth, &wet.seen].map(wgpu::BindingResource::TextureView);
+    bindings::group(&gpu.device, "distances", &distances_layout(&gpu.device), views)
+}
+
+fn distances_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let types = [bindings::depths(), bindings::depths(), bindings::numbers()];
+    bindings::group_layout(device, "distances", wgpu::ShaderStages::FRAGMENT, &types)
+}
+
+/// The light of a picture, and how it is shown.
+fn shown_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let types = [bindings::texels(wgpu::TextureViewDimension::D2), bindings::uniform(false)];
+    bindings::group_layout(device, "display", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
 /// A texture of a size (pixels, at least one each way) that passes draw and shaders read.

@@ -1,35 +1,30 @@
 //! A scene made ready for the GPU: the engine's tables as textures.
 
-use crate::coat::GpuCoat;
+use crate::bindings;
+use crate::coat::{GpuCoat, PICTURE_BYTES};
 use crate::device::Gpu;
 use crate::frame::LEVELS;
 use crate::objects::{Objects, TooManyObjects};
 use crate::waves::Waves;
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
-use littoral::field::Sea;
-use littoral::picture::{Lattice, Placed, SkyTable, Slab, Tables};
+use littoral::field::{HeightField, Sea};
+use littoral::picture::{Lattice, Medium, Placed, SkyTable, Slab, Stage, Tables};
+use littoral::space::View;
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{TextureDimension, TextureFormat};
 
 /// What is seen, and in which light: made once, good for any number of views. It has no ground until a mesh of it is drawn.
 #[derive(Debug)]
 pub struct Scenery {
-    pub(crate) fine: wgpu::Texture,
-    pub(crate) coarse: wgpu::Texture,
-    /// How far samples are known; which are cut away.
-    pub(crate) known: wgpu::Texture,
-    /// Tangent of the horizon's elevation towards the sun; height of trees and houses (m).
-    pub(crate) horizon: wgpu::Texture,
+    /// All that [`layout`] names; what changes with the eye's height is also here to be written.
+    pub(crate) group: wgpu::BindGroup,
+    eye_light: wgpu::Texture,
+    eye_through: wgpu::Texture,
+    /// Instead of that of waves where there are none.
+    still: wgpu::BindGroup,
     pub(crate) coat: GpuCoat,
-    pub(crate) eye_light: wgpu::Texture,
-    pub(crate) eye_through: wgpu::Texture,
-    pub(crate) land_light: wgpu::Texture,
-    pub(crate) skylight: wgpu::Texture,
-    pub(crate) basin: wgpu::Texture,
-    pub(crate) rim: wgpu::Texture,
-    /// What water does to light, two rows; and sunlight by height, the third.
-    pub(crate) media: wgpu::Texture,
+    pub(crate) medium: Medium,
     pub(crate) waves: Option<Waves>,
     pub(crate) objects: Objects,
     /// Of the lattice that meshes' vertices are on (m), and metres a step.
@@ -91,6 +86,21 @@ impl Scenery {
     /// # Errors
     /// If the raster is larger than textures can be.
     pub fn new(gpu: &Gpu, tables: &Tables, datum: (DVec2, DVec2), sky: (f64, &SkyTable)) -> Result<Scenery, TooLarge> {
+        Scenery::with_picture_bytes(gpu, tables, datum, sky, PICTURE_BYTES)
+    }
+
+    /// The same where a picture that is laid over the land may take so many bytes of the device (usually 256 MiB); of a larger one there are only the pages of
+    /// [`Scenery::bring_picture`].
+    ///
+    /// # Errors
+    /// As [`Scenery::new`].
+    pub fn with_picture_bytes(
+        gpu: &Gpu,
+        tables: &Tables,
+        datum: (DVec2, DVec2),
+        sky: (f64, &SkyTable),
+        picture_bytes: u64,
+    ) -> Result<Scenery, TooLarge> {
         let finest = &tables.heights[0];
         let most = gpu.device.limits().max_texture_dimension_2d;
         let (columns, rows) = (finest.columns, finest.rows);
@@ -104,7 +114,6 @@ impl Scenery {
         let floats =
             |label, values: &[f32], size| make(label, TextureFormat::R32Float, size, bytemuck::cast_slice(values));
         let (size, atlas, levels) = atlas(&tables.heights[1..]);
-        let coarse = floats("coarse heights", &atlas, [size.x, size.y, 1]);
         let known = match tables.known.is_empty() && tables.cut_away.is_empty() {
             true => make("known", TextureFormat::Rg8Unorm, [1, 1, 1], &[255, 0]),
             false => {
@@ -156,29 +165,33 @@ impl Scenery {
             })
         };
         let half = TextureFormat::Rgba16Float;
+        let (eye_light, land_light) = (volume("sky of the eye"), volume("sky of the land"));
+        let nothing = vec![0; (distances * elevations * 8) as usize];
+        let eye_through = make("air before the eye", half, [distances, elevations, 1], &nothing);
+        let points = [tables.skylight.columns as u32, tables.skylight.rows as u32, 9];
+        let (coat, coat_map, pages) = GpuCoat::new(gpu, &tables.coat, picture_bytes);
+        let textures = [
+            &floats("heights", &finest.values, map),
+            &floats("coarse heights", &atlas, [size.x, size.y, 1]),
+            &known,
+            &coat_map,
+            &make("horizon", TextureFormat::Rg16Float, map, bytemuck::cast_slice(&horizon)),
+            &eye_light,
+            &eye_through,
+            &land_light,
+            &make("skylight", half, points, bytemuck::cast_slice(&skylight)),
+            &make("media", half, [width as u32, 3, 1], bytemuck::cast_slice(&halves(media))),
+            &make("basin", TextureFormat::Rg8Unorm, [basin_size.x, basin_size.y, 1], &wet),
+            &make("rim", TextureFormat::Rg32Float, rim_size, bytemuck::cast_slice(&rim)),
+        ];
+        write_light(gpu, &land_light, &tables.land_sky);
         let mut scenery = Scenery {
-            fine: floats("heights", &finest.values, map),
-            coarse,
-            known,
-            horizon: make("horizon", TextureFormat::Rg16Float, map, bytemuck::cast_slice(&horizon)),
-            coat: GpuCoat::new(gpu, &tables.coat),
-            eye_light: volume("sky of the eye"),
-            eye_through: make(
-                "air before the eye",
-                half,
-                [distances, elevations, 1],
-                &vec![0; (distances * elevations * 8) as usize],
-            ),
-            land_light: volume("sky of the land"),
-            skylight: make(
-                "skylight",
-                half,
-                [tables.skylight.columns as u32, tables.skylight.rows as u32, 9],
-                bytemuck::cast_slice(&skylight),
-            ),
-            basin: make("basin", TextureFormat::Rg8Unorm, [basin_size.x, basin_size.y, 1], &wet),
-            rim: make("rim", TextureFormat::Rg32Float, rim_size, bytemuck::cast_slice(&rim)),
-            media: make("media", half, [width as u32, 3, 1], bytemuck::cast_slice(&halves(media))),
+            group: group(&gpu.device, textures, &pages),
+            eye_light,
+            eye_through,
+            still: crate::waves::run_up(gpu, [1, 1], &[0.0]),
+            coat,
+            medium: tables.medium,
             waves: None,
             objects: Objects::default(),
             origin: datum.0,
@@ -215,7 +228,6 @@ impl Scenery {
             open: tables.open,
             sky_height: f64::NAN,
         };
-        scenery.write_light(gpu, &scenery.land_light, &tables.land_sky);
         scenery.set_sky(gpu, sky.0, sky.1);
         Ok(scenery)
     }
@@ -228,15 +240,27 @@ impl Scenery {
 
     /// The sky and the air as an eye at a height (m) sees them.
     pub fn set_sky(&mut self, gpu: &Gpu, height: f64, sky: &SkyTable) {
-        self.write_light(gpu, &self.eye_light, &sky.light);
+        write_light(gpu, &self.eye_light, &sky.light);
         let through = halves(sky.through.iter().map(|&through| (through, 0.0)));
         write(gpu, &self.eye_through, bytemuck::cast_slice(&through));
         self.sky_height = height;
     }
 
+    /// Brings what a view needs of the picture that is laid over the land, that of the stage, if it is too large to be there as a whole: no more than `most` pages of 256 × 256 texels
+    /// that are not there yet, the coarsest first. What is not there is seen in coarser ones. Whether all is there, and whether anything has changed.
+    pub fn bring_picture(&mut self, gpu: &Gpu, stage: &Stage, view: &View, most: usize) -> (bool, bool) {
+        let range = stage.land().height_range();
+        match (&mut self.coat.pages, stage.drape()) {
+            (Some(pages), Some(drape)) => {
+                pages.bring(gpu, drape, (stage.land().datum(), [range.low, range.high]), view, most)
+            }
+            _ => (true, false),
+        }
+    }
+
     /// Whether there is water that waves can be drawn on: on maps it is a colour.
     pub fn shows_waves(&self) -> bool {
-        self.level.is_some() && self.coat.kind != 1.0
+        self.level.is_some() && !self.coat.is_map()
     }
 
     /// Draws waves on the water from here on, or still water.
@@ -251,7 +275,7 @@ impl Scenery {
         }
     }
 
-    /// Draws these objects from here on, in place of those before: [`Stage::placed`](littoral::picture::Stage::placed).
+    /// Draws these objects from here on, in place of those before: [`Stage::placed`].
     ///
     /// # Errors
     /// If they do not fit into the device's buffers; then nothing changes.
@@ -259,11 +283,53 @@ impl Scenery {
         self.objects.set(gpu, placed)
     }
 
-    /// Light of the sky: azimuths are slices, one after the other for each kind of scattering.
-    fn write_light(&self, gpu: &Gpu, texture: &wgpu::Texture, light: &[[Vec3; 3]]) {
-        let kinds = (0..3).flat_map(|kind| light.iter().map(move |light| (light[kind] * GAIN, 0.0)));
-        write(gpu, texture, bytemuck::cast_slice(&halves(kinds)));
+    /// How high swash reaches: what the pass that shades is bound to.
+    pub(crate) fn run_up(&self) -> &wgpu::BindGroup {
+        self.waves.as_ref().map_or(&self.still, |waves| &waves.run_up.0)
     }
+}
+
+/// The layout of a scenery's group: its textures, in the order in which [`Scenery::new`] names them, a sampler that reads between texels, and the pages of a picture.
+pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    use wgpu::TextureViewDimension::{D2, D2Array, D3};
+    let (texels, smooth) = (bindings::texels(D2), bindings::smooth(D2));
+    let types = [
+        texels,
+        texels,
+        texels,
+        smooth,
+        texels,
+        bindings::smooth(D3),
+        smooth,
+        bindings::smooth(D3),
+        bindings::smooth(D2Array),
+        smooth,
+        texels,
+        texels,
+        wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+        bindings::storage(true),
+    ];
+    bindings::group_layout(device, "scenery", wgpu::ShaderStages::FRAGMENT, &types)
+}
+
+fn group(device: &wgpu::Device, textures: [&wgpu::Texture; 12], pages: &wgpu::Buffer) -> wgpu::BindGroup {
+    let views = textures.map(|texture| texture.create_view(&Default::default()));
+    let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("smooth"),
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        ..Default::default()
+    });
+    let views = views.iter().map(wgpu::BindingResource::TextureView);
+    let others = [wgpu::BindingResource::Sampler(&sampler), pages.as_entire_binding()];
+    bindings::group(device, "scenery", &layout(device), views.chain(others))
+}
+
+/// Light of the sky: azimuths are slices, one after the other for each kind of scattering.
+fn write_light(gpu: &Gpu, texture: &wgpu::Texture, light: &[[Vec3; 3]]) {
+    let kinds = (0..3).flat_map(|kind| light.iter().map(move |light| (light[kind] * GAIN, 0.0)));
+    write(gpu, texture, bytemuck::cast_slice(&halves(kinds)));
 }
 
 /// Colours as half floats, with a fourth number.

@@ -21,7 +21,7 @@ pub(crate) mod sample;
 pub(crate) mod shore;
 mod upload;
 
-use crate::{Gpu, GpuError};
+use crate::{Gpu, GpuError, bindings};
 use foam::{Foam, Moment};
 use glam::DVec2;
 use littoral::waves::WaveModel;
@@ -116,8 +116,9 @@ impl GpuSea {
         let groups = (0..plan.levels).map(|level| {
             let view = view(&motion, level);
             [(0, 1), (1, 0)].map(|(before, after): (usize, usize)| {
-                group(
+                bindings::group(
                     device,
+                    "sea",
                     &layout,
                     [
                         part(&steps, Plan::STEP),
@@ -139,8 +140,9 @@ impl GpuSea {
         let sample_tiles = sample::tiles(sea, &sea.breakers(), side);
         let sample_buffer = constant("sea: places", bytemuck::cast_slice(&sample_tiles), storage | copy);
         let sample_layout = sample::layout(device);
-        let sample_group = group(
+        let sample_group = bindings::group(
             device,
+            "sea",
             &sample_layout,
             [
                 sample_buffer.as_entire_binding(),
@@ -210,8 +212,10 @@ impl GpuSea {
             }
             self.gpu.queue.write_buffer(&self.moments, 0, &bytes);
             {
-                let mut pass = encoder
-                    .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("sea"), timestamp_writes: None });
+                // Ticks of foam after a leap in time take submissions of their own, and are not told.
+                let timestamp_writes = if last { self.gpu.compute_times("sea") } else { None };
+                let mut pass =
+                    encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("sea"), timestamp_writes });
                 (0..some.len()).for_each(|tick| self.sum(&mut pass, tick, true));
                 if last {
                     self.sum(&mut pass, some.len(), false);
@@ -366,13 +370,14 @@ impl Caps {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let layout = group_layout(
+        let layout = bindings::group_layout(
             device,
+            "sea",
             wgpu::ShaderStages::COMPUTE,
-            [
-                buffer(wgpu::BufferBindingType::Uniform, false),
-                buffer(wgpu::BufferBindingType::Storage { read_only: true }, false),
-                sampled(),
+            &[
+                bindings::uniform(false),
+                bindings::storage(true),
+                bindings::texels(wgpu::TextureViewDimension::D2Array),
                 stored(wgpu::TextureFormat::R32Float),
             ],
         );
@@ -386,7 +391,7 @@ impl Caps {
                 wgpu::BindingResource::TextureView(&finer),
                 wgpu::BindingResource::TextureView(&to),
             ];
-            group(device, &layout, resources)
+            bindings::group(device, "sea", &layout, resources)
         });
         let groups = groups.collect();
         Caps { foam, instant, shown, pipelines, groups }
@@ -446,48 +451,9 @@ fn part(buffer: &wgpu::Buffer, size: u64) -> wgpu::BindingResource<'_> {
     wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size: wgpu::BufferSize::new(size) })
 }
 
-pub(crate) fn buffer(ty: wgpu::BufferBindingType, has_dynamic_offset: bool) -> wgpu::BindingType {
-    wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None }
-}
-
-/// A texture with layers that is read texel by texel.
-fn sampled() -> wgpu::BindingType {
-    wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: false },
-        view_dimension: wgpu::TextureViewDimension::D2Array,
-        multisampled: false,
-    }
-}
-
 fn stored(format: wgpu::TextureFormat) -> wgpu::BindingType {
     let access = wgpu::StorageTextureAccess::WriteOnly;
     wgpu::BindingType::StorageTexture { access, format, view_dimension: wgpu::TextureViewDimension::D2Array }
-}
-
-pub(crate) fn group_layout<const N: usize>(
-    device: &wgpu::Device,
-    visibility: wgpu::ShaderStages,
-    types: [wgpu::BindingType; N],
-) -> wgpu::BindGroupLayout {
-    let mut binding = 0..;
-    let entries = types.map(|ty| wgpu::BindGroupLayoutEntry {
-        binding: binding.next().unwrap_or_default(),
-        visibility,
-        ty,
-        count: None,
-    });
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("sea"), entries: &entries })
-}
-
-pub(crate) fn group<const N: usize>(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    resources: [wgpu::BindingResource; N],
-) -> wgpu::BindGroup {
-    let mut binding = 0..;
-    let entries =
-        resources.map(|resource| wgpu::BindGroupEntry { binding: binding.next().unwrap_or_default(), resource });
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("sea"), layout, entries: &entries })
 }
 
 fn pipeline(
@@ -497,11 +463,7 @@ fn pipeline(
     entry: &str,
     constants: &[(&str, f64)],
 ) -> wgpu::ComputePipeline {
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("sea"),
-        bind_group_layouts: &[Some(group)],
-        immediate_size: 0,
-    });
+    let layout = bindings::pipeline_layout(device, "sea", &[group]);
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some("sea"),
         layout: Some(&layout),
@@ -514,12 +476,10 @@ fn pipeline(
 
 /// What the passes of the transform are bound to.
 fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let uniform = wgpu::BufferBindingType::Uniform;
-    let read = buffer(wgpu::BufferBindingType::Storage { read_only: true }, false);
-    let write = buffer(wgpu::BufferBindingType::Storage { read_only: false }, false);
+    let (read, write) = (bindings::storage(true), bindings::storage(false));
     let types = [
-        buffer(uniform, true),
-        buffer(uniform, true),
+        bindings::uniform(true),
+        bindings::uniform(true),
         read,
         read,
         read,
@@ -528,7 +488,7 @@ fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         stored(wgpu::TextureFormat::Rgba32Float),
         write,
     ];
-    group_layout(device, wgpu::ShaderStages::COMPUTE, types)
+    bindings::group_layout(device, "sea", wgpu::ShaderStages::COMPUTE, &types)
 }
 
 /// The source of a transform.

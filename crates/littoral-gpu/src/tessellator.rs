@@ -14,8 +14,9 @@
 //! After the virtual Earth of GraphiCon 2016, whose tessellation and geometry stages portable interfaces do not have.
 
 mod land;
+mod passes;
 
-use crate::compute::{TEXELS, bind, binding, layout, read};
+use crate::compute::{bind, read};
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use crate::triangles::Triangles;
@@ -25,6 +26,7 @@ use land::DeviceLand;
 use littoral::field::Land;
 use littoral::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
 use littoral::space::{Cell, View};
+pub use passes::TessellationPasses;
 
 /// The shaders of a tessellation with their names, as they are compiled: for tests that need no device.
 pub const TESSELLATION_SHADERS: [(&str, &str); 2] = [
@@ -100,11 +102,7 @@ pub struct Tessellator {
     bins: wgpu::Buffer,
     /// Workgroups of the next pass, written by turns.
     workgroups: [wgpu::Buffer; 2],
-    first_levels: wgpu::ComputePipeline,
-    count: wgpu::ComputePipeline,
-    settle: wgpu::ComputePipeline,
-    cut: wgpu::ComputePipeline,
-    draw: wgpu::ComputePipeline,
+    passes: TessellationPasses,
     /// By level; the first is for all of [`FIRST_LEVELS`].
     levels: Vec<wgpu::BindGroup>,
     /// For passes that write to the first or the second of `workgroups`.
@@ -134,10 +132,11 @@ impl Tessellator {
     ///
     /// # Errors
     /// If the land has more samples along a side than the device's textures.
-    pub fn new(gpu: &Gpu, land: &Land, limits: Limits) -> Result<Tessellator, TooLarge> {
+    pub fn new(gpu: &Gpu, passes: &TessellationPasses, land: &Land, limits: Limits) -> Result<Tessellator, TooLarge> {
         let triangles = limits.triangles.max(64) as u64;
         Tessellator::with_room(
             gpu,
+            passes,
             land,
             limits,
             CELLS_A_TRIANGLE.saturating_mul(triangles).saturating_add(CELLS_BESIDE),
@@ -148,7 +147,13 @@ impl Tessellator {
     ///
     /// # Errors
     /// As [`Tessellator::new`].
-    pub fn with_room(gpu: &Gpu, land: &Land, limits: Limits, cells: u64) -> Result<Tessellator, TooLarge> {
+    pub fn with_room(
+        gpu: &Gpu,
+        passes: &TessellationPasses,
+        land: &Land,
+        limits: Limits,
+        cells: u64,
+    ) -> Result<Tessellator, TooLarge> {
         let device = &gpu.device;
         let on_device = DeviceLand::new(gpu, land)?;
         let finest = limits.finest.min(land.finest_level());
@@ -183,12 +188,6 @@ impl Tessellator {
         let corners = buffer("tessellation: triangles", 12 * most, storage | Usage::INDEX | Usage::COPY_SRC);
         let drawn = buffer("tessellation: draw", 20, storage | Usage::INDIRECT | Usage::COPY_DST | Usage::COPY_SRC);
 
-        let (uniform, write) =
-            (binding(wgpu::BufferBindingType::Uniform), binding(wgpu::BufferBindingType::Storage { read_only: false }));
-        let shared = [uniform, uniform, TEXELS, TEXELS, write, write, write, write];
-        let level_layout = layout(device, &[&shared[..], &[write]].concat());
-        let turn_layout = layout(device, &[write]);
-        let draw_layout = layout(device, &[&shared[..], &[write, write, write]].concat());
         let group = |number: u8, layout: &wgpu::BindGroupLayout, more: &[&wgpu::Buffer]| {
             let views =
                 [on_device.cells(number), &on_device.heights].map(|texture| texture.create_view(&Default::default()));
@@ -207,38 +206,11 @@ impl Tessellator {
             resources.extend(lists.into_iter().chain(more.iter().copied()).map(wgpu::Buffer::as_entire_binding));
             bind(device, layout, resources)
         };
-        let [levels, draw] = TESSELLATION_SHADERS.map(|(label, source)| {
-            device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(label),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            })
-        });
-        let pipeline = |module, entry, groups: &[Option<&wgpu::BindGroupLayout>]| {
-            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("tessellation"),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            });
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: Some(&layout),
-                module,
-                entry_point: Some(entry),
-                compilation_options: Default::default(),
-                cache: None,
-            })
-        };
-        let alone = [Some(&level_layout)];
-        let both = [Some(&level_layout), Some(&turn_layout)];
         Ok(Tessellator {
-            first_levels: pipeline(&levels, "first_levels", &both),
-            count: pipeline(&levels, "count", &alone),
-            settle: pipeline(&levels, "settle", &both),
-            cut: pipeline(&levels, "cut_level", &alone),
-            draw: pipeline(&draw, "draw", &[Some(&draw_layout)]),
-            levels: (0..=finest).map(|number| group(number, &level_layout, &[&bins])).collect(),
-            turns: [0, 1].map(|turn| bind(device, &turn_layout, vec![turns[turn].as_entire_binding()])),
-            drawing: group(finest, &draw_layout, &[&vertices, &corners, &drawn]),
+            passes: passes.clone(),
+            levels: (0..=finest).map(|number| group(number, &passes.level, &[&bins])).collect(),
+            turns: [0, 1].map(|turn| bind(device, &passes.turn, vec![turns[turn].as_entire_binding()])),
+            drawing: group(finest, &passes.drawing, &[&vertices, &corners, &drawn]),
             land: on_device,
             finest,
             most: most as u32,
@@ -283,25 +255,25 @@ impl Tessellator {
         // How many workgroups go over a level's list is in one of two buffers: *settle* of the level above wrote it while passes went by the other.
         let of = |level: u8| usize::from(level) % 2;
         let first = self.finest.min(FIRST_LEVELS - 1);
-        pass.set_pipeline(&self.first_levels);
+        pass.set_pipeline(&self.passes.first_levels);
         pass.set_bind_group(0, &self.levels[0], &[]);
         pass.set_bind_group(1, &self.turns[of(first + 1)], &[]);
         pass.dispatch_workgroups(1, 1, 1);
         for level in first + 1..=self.finest {
             pass.set_bind_group(0, &self.levels[usize::from(level)], &[]);
             if level > first + 1 {
-                pass.set_pipeline(&self.cut);
+                pass.set_pipeline(&self.passes.cut);
                 pass.dispatch_workgroups_indirect(&self.workgroups[of(level - 1)], 0);
             }
             if level < self.finest {
-                pass.set_pipeline(&self.count);
+                pass.set_pipeline(&self.passes.count);
                 pass.dispatch_workgroups_indirect(&self.workgroups[of(level)], 0);
             }
-            pass.set_pipeline(&self.settle);
+            pass.set_pipeline(&self.passes.settle);
             pass.set_bind_group(1, &self.turns[of(level + 1)], &[]);
             pass.dispatch_workgroups(1, 1, 1);
         }
-        pass.set_pipeline(&self.draw);
+        pass.set_pipeline(&self.passes.draw);
         pass.set_bind_group(0, &self.drawing, &[]);
         pass.dispatch_workgroups_indirect(&self.workgroups[of(self.finest + 1)], 12);
         Ok(())

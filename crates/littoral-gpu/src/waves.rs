@@ -10,7 +10,7 @@ mod grid;
 
 use crate::renderer::drawable;
 use crate::sea::{self, GpuSea, shore::GpuShore};
-use crate::{Gpu, GpuError};
+use crate::{Gpu, GpuError, bindings};
 use glam::{DVec2, UVec2};
 use grid::WaveGrid;
 use littoral::field::{Finest, Sea};
@@ -60,8 +60,8 @@ pub struct Waves {
     time: f64,
     /// Tells one instant of one sea from all others.
     instant: u64,
-    /// How high swash reaches above still water (m), on the nodes of the bed, and where these are.
-    pub(crate) run_up: (wgpu::Texture, DVec2, DVec2),
+    /// How high swash reaches above still water (m): what the pass that shades is bound to, and the nodes of the bed that it is known at.
+    pub(crate) run_up: (wgpu::BindGroup, DVec2, DVec2),
 }
 
 impl std::fmt::Debug for Waves {
@@ -120,14 +120,6 @@ impl Waves {
             let high = |place: &[f32; 8]| place[6] + ShoreSea::FARTHEST_SWASH * place[7];
             reach = tables.places[..tables.columns * tables.rows].iter().map(high).collect();
         }
-        let map = crate::scenery::texture(
-            gpu,
-            "run-up",
-            wgpu::TextureFormat::R32Float,
-            [size[0], size[1], 1],
-            wgpu::TextureDimension::D2,
-            bytemuck::cast_slice(&reach),
-        );
         let mut waves = Waves {
             tiles: GpuSea::new(gpu, parts.tiles)?,
             shore: GpuShore::new(gpu, tables, parts.sheltered.map(Sheltered::shelter))?,
@@ -136,7 +128,7 @@ impl Waves {
             level: sea.level(),
             time: f64::NAN,
             instant: 0,
-            run_up: (map, nodes.0, nodes.1),
+            run_up: (run_up(gpu, size, &reach), nodes.0, nodes.1),
         };
         waves.follow(gpu, sea);
         Ok(Some(waves))
@@ -165,20 +157,40 @@ impl Waves {
     }
 }
 
+/// How high swash reaches, on so many columns and rows of nodes, for the pass that shades.
+pub(crate) fn run_up(gpu: &Gpu, [columns, rows]: [u32; 2], reach: &[f32]) -> wgpu::BindGroup {
+    let (format, flat) = (wgpu::TextureFormat::R32Float, wgpu::TextureDimension::D2);
+    let map = crate::scenery::texture(gpu, "run-up", format, [columns, rows, 1], flat, bytemuck::cast_slice(reach));
+    let view = map.create_view(&Default::default());
+    let layout = run_up_layout(&gpu.device);
+    bindings::group(&gpu.device, "run-up", &layout, [wgpu::BindingResource::TextureView(&view)])
+}
+
+/// The layout of that group.
+pub(crate) fn run_up_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let map = bindings::texels(wgpu::TextureViewDimension::D2);
+    bindings::group_layout(device, "run-up", wgpu::ShaderStages::FRAGMENT, &[map])
+}
+
 /// What is known of the sea in each pixel of a canvas.
 #[derive(Debug)]
 pub(crate) struct Wet {
+    /// Pixels.
+    pub size: UVec2,
     /// As far away as the sea.
-    pub depth: wgpu::Texture,
+    pub depth: wgpu::TextureView,
     /// What `wave_seen.wgsl` tells.
-    pub seen: wgpu::Texture,
+    pub seen: wgpu::TextureView,
 }
 
 impl Wet {
     /// For pictures of a size.
     pub fn new(gpu: &Gpu, size: UVec2, depth: wgpu::TextureFormat) -> Wet {
-        let make = |label, format| drawable(gpu, label, size, format, wgpu::TextureUsages::empty());
-        Wet { depth: make("depth of the sea", depth), seen: make("sea seen", wgpu::TextureFormat::Rgba32Uint) }
+        let make = |label, format| {
+            let texture = drawable(gpu, label, size, format, wgpu::TextureUsages::empty());
+            texture.create_view(&Default::default())
+        };
+        Wet { size, depth: make("depth of the sea", depth), seen: make("sea seen", wgpu::TextureFormat::Rgba32Uint) }
     }
 }
 
@@ -191,6 +203,14 @@ struct GridUniform {
     far: [f32; 4],
 }
 
+/// What the passes are bound to, as long as it is the same rings, points and distances of the ground.
+#[derive(Debug)]
+struct Bound {
+    of: (wgpu::Buffer, wgpu::Buffer, wgpu::TextureView),
+    moving: wgpu::BindGroup,
+    seeing: wgpu::BindGroup,
+}
+
 /// The passes that draw waves.
 #[derive(Debug)]
 pub(crate) struct WavePass {
@@ -199,6 +219,7 @@ pub(crate) struct WavePass {
     grid: wgpu::Buffer,
     radii: Option<wgpu::Buffer>,
     points: Option<wgpu::Buffer>,
+    bound: Option<Bound>,
     /// The view and the instant that the points are for, and how many: a ring, rings.
     drawn: Option<(View, u64, [u32; 2])>,
 }
@@ -214,16 +235,10 @@ impl WavePass {
             })
         });
         let (tiles, shore) = (sea::sample::layout(device), sea::shore::layout(device));
-        let layout = |writes| {
-            device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("waves"),
-                bind_group_layouts: &[Some(&own_layout(device, writes)), Some(&tiles), Some(&shore)],
-                immediate_size: 0,
-            })
-        };
+        let layout = |own| bindings::pipeline_layout(device, "waves", &[&own, &tiles, &shore]);
         let move_points = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("wave points"),
-            layout: Some(&layout(true)),
+            layout: Some(&layout(moving_layout(device))),
             module: &points,
             entry_point: Some("move_points"),
             compilation_options: Default::default(),
@@ -231,7 +246,7 @@ impl WavePass {
         });
         let seen = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("waves seen"),
-            layout: Some(&layout(false)),
+            layout: Some(&layout(seeing_layout(device))),
             vertex: wgpu::VertexState {
                 module: &seen,
                 entry_point: Some("wave"),
@@ -262,7 +277,7 @@ impl WavePass {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        WavePass { move_points, seen, grid, radii: None, points: None, drawn: None }
+        WavePass { move_points, seen, grid, radii: None, points: None, bound: None, drawn: None }
     }
 
     /// Records the passes that find the sea, given how far the ground is. `land` is the land's rectangle (m).
@@ -287,26 +302,25 @@ impl WavePass {
             if let Some(grid) = WaveGrid::of(view, waves.level, &waves.bounds, border) {
                 let size = self.set_grid(gpu, &grid);
                 self.drawn = Some((*view, waves.instant, size));
-                let bound = self.bind(gpu, uniforms, None);
+                self.bind(gpu, uniforms, ground);
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("wave points"),
-                    timestamp_writes: None,
+                    timestamp_writes: gpu.compute_times("wave points"),
                 });
                 pass.set_pipeline(&self.move_points);
-                for (number, group) in bound.iter().chain([waves.tiles.sample_group(), waves.shore.group()]).enumerate()
-                {
-                    pass.set_bind_group(number as u32, group, &[]);
-                }
+                let own = self.bound.as_ref().map(|bound| &bound.moving);
+                pass.set_bind_group(0, own, &[]);
+                pass.set_bind_group(1, waves.tiles.sample_group(), &[]);
+                pass.set_bind_group(2, waves.shore.group(), &[]);
                 pass.dispatch_workgroups(size[0].div_ceil(64), size[1], 1);
             }
         }
         let size = self.drawn.map_or([0, 0], |drawn| drawn.2);
-        let bound = self.bind(gpu, uniforms, Some(ground));
-        let (seen, depth) = (wet.seen.create_view(&Default::default()), wet.depth.create_view(&Default::default()));
+        self.bind(gpu, uniforms, ground);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("waves"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &seen,
+                view: &wet.seen,
                 depth_slice: None,
                 resolve_target: None,
                 ops: wgpu::Operations {
@@ -315,19 +329,20 @@ impl WavePass {
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &depth,
+                view: &wet.depth,
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
             }),
+            timestamp_writes: gpu.render_times("waves"),
             ..Default::default()
         });
         if size[1] < 2 {
             return;
         }
         pass.set_pipeline(&self.seen);
-        for (number, group) in bound.iter().chain([waves.tiles.sample_group(), waves.shore.group()]).enumerate() {
-            pass.set_bind_group(number as u32, group, &[]);
-        }
+        pass.set_bind_group(0, self.bound.as_ref().map(|bound| &bound.seeing), &[]);
+        pass.set_bind_group(1, waves.tiles.sample_group(), &[]);
+        pass.set_bind_group(2, waves.shore.group(), &[]);
         pass.draw(0..2 * size[0], 0..size[1] - 1);
     }
 
@@ -356,33 +371,34 @@ impl WavePass {
         size
     }
 
-    /// What the pass over pixels is bound to, given how far the ground is; else what the points' is.
-    fn bind(&self, gpu: &Gpu, uniforms: &wgpu::Buffer, ground: Option<&wgpu::TextureView>) -> Option<wgpu::BindGroup> {
-        let (radii, points) = (self.radii.as_ref()?, self.points.as_ref()?);
-        let [a, b, c, d] = [uniforms, &self.grid, radii, points].map(|buffer| buffer.as_entire_binding());
-        let layout = own_layout(&gpu.device, ground.is_none());
-        Some(match ground {
-            Some(view) => sea::group(&gpu.device, &layout, [a, b, c, d, wgpu::BindingResource::TextureView(view)]),
-            None => sea::group(&gpu.device, &layout, [a, b, c, d]),
-        })
+    /// Makes what the passes are bound to, if it is not that already.
+    fn bind(&mut self, gpu: &Gpu, uniforms: &wgpu::Buffer, ground: &wgpu::TextureView) {
+        let (Some(radii), Some(points)) = (&self.radii, &self.points) else { return };
+        let of = (radii.clone(), points.clone(), ground.clone());
+        if self.bound.as_ref().is_some_and(|bound| bound.of == of) {
+            return;
+        }
+        let device = &gpu.device;
+        let own = || [uniforms, &self.grid, radii, points].map(wgpu::Buffer::as_entire_binding);
+        let ground = wgpu::BindingResource::TextureView(ground);
+        let moving = bindings::group(device, "wave points", &moving_layout(device), own());
+        let seeing = bindings::group(device, "waves seen", &seeing_layout(device), own().into_iter().chain([ground]));
+        self.bound = Some(Bound { of, moving, seeing });
     }
 }
 
-/// Frame, grid, radii and points, to be written or to be drawn; then also how far the ground is.
-fn own_layout(device: &wgpu::Device, writes: bool) -> wgpu::BindGroupLayout {
-    let uniform = || sea::buffer(wgpu::BufferBindingType::Uniform, false);
-    let storage = |read_only| sea::buffer(wgpu::BufferBindingType::Storage { read_only }, false);
-    if writes {
-        let types = [uniform(), uniform(), storage(true), storage(false)];
-        return sea::group_layout(device, wgpu::ShaderStages::COMPUTE, types);
-    }
-    let depth = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Depth,
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    let types = [uniform(), uniform(), storage(true), storage(true), depth];
-    sea::group_layout(device, wgpu::ShaderStages::VERTEX_FRAGMENT, types)
+/// Frame, grid, radii and points to be written.
+fn moving_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let (uniform, storage) = (bindings::uniform(false), bindings::storage);
+    let types = [uniform, uniform, storage(true), storage(false)];
+    bindings::group_layout(device, "wave points", wgpu::ShaderStages::COMPUTE, &types)
+}
+
+/// Frame, grid, radii and points to be drawn, and how far away the ground is.
+fn seeing_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let (uniform, read) = (bindings::uniform(false), bindings::storage(true));
+    let types = [uniform, uniform, read, read, bindings::depths()];
+    bindings::group_layout(device, "waves seen", wgpu::ShaderStages::VERTEX_FRAGMENT, &types)
 }
 
 #[cfg(test)]
@@ -413,13 +429,10 @@ mod tests {
             label: None,
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let storage = |read_only| sea::buffer(wgpu::BufferBindingType::Storage { read_only }, false);
-        let own = sea::group_layout(device, wgpu::ShaderStages::COMPUTE, [storage(true), storage(false)]);
-        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &[Some(&sea::sample::layout(device)), Some(&sea::shore::layout(device)), Some(&own)],
-            immediate_size: 0,
-        });
+        let types = [bindings::storage(true), bindings::storage(false)];
+        let own = bindings::group_layout(device, "asked", wgpu::ShaderStages::COMPUTE, &types);
+        let (tiles, shore) = (sea::sample::layout(device), sea::shore::layout(device));
+        let layout = bindings::pipeline_layout(device, "asked", &[&tiles, &shore, &own]);
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: None,
             layout: Some(&layout),
@@ -435,7 +448,7 @@ mod tests {
         gpu.queue.write_buffer(&asked, 0, bytemuck::cast_slice(places));
         let told = buffer(64 * places.len() as u64, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
         let back = buffer(told.size(), wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
-        let bound = sea::group(device, &own, [asked.as_entire_binding(), told.as_entire_binding()]);
+        let bound = bindings::group(device, "asked", &own, [asked.as_entire_binding(), told.as_entire_binding()]);
         let mut encoder = device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());

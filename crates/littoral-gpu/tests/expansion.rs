@@ -15,8 +15,11 @@ use littoral_gpu::{Expander, Gpu, Painter};
 pub use surfaces::Random;
 use surfaces::{random_terrain, random_view, surface_of};
 
-/// Triangles in an order of their own: their corners, and the heights of these.
-fn sorted(mesh: &Mesh) -> Vec<([(u32, u32); 3], [f32; 3])> {
+/// The corners of a triangle, and their heights.
+type Triangle = ([(u32, u32); 3], [f32; 3]);
+
+/// Triangles in an order of their own.
+fn sorted(mesh: &Mesh) -> Vec<Triangle> {
     let of = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|i| mesh.vertices[i as usize]);
         [[a, b, c], [b, c, a], [c, a, b]]

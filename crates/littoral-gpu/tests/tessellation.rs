@@ -14,7 +14,7 @@ use littoral::field::{HeightField, Land, Raster, coast};
 use littoral::lod::{Drawing, Limits, Lod, Patches, Reached, ViewError};
 use littoral::picture::{Scene, Stage, coast_shot};
 use littoral::space::View;
-use littoral_gpu::{Gpu, Painter, Tessellated, Tessellator};
+use littoral_gpu::{Gpu, Painter, Tessellated, TessellationPasses, Tessellator};
 use std::collections::HashSet;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 pub use surfaces::{Random, Surface};
@@ -43,12 +43,18 @@ struct OnDevice<'a> {
 }
 
 impl OnDevice<'_> {
-    fn new<'a>(gpu: &'a Gpu, land: &Land, limits: Limits) -> OnDevice<'a> {
-        OnDevice { gpu, tessellator: Tessellator::new(gpu, land, limits).expect("a small land"), told: None }
+    fn new<'a>(gpu: &'a Gpu, passes: &TessellationPasses, land: &Land, limits: Limits) -> OnDevice<'a> {
+        OnDevice { gpu, tessellator: Tessellator::new(gpu, passes, land, limits).expect("a small land"), told: None }
     }
 
-    fn with_room<'a>(gpu: &'a Gpu, land: &Land, limits: Limits, cells: u64) -> OnDevice<'a> {
-        let tessellator = Tessellator::with_room(gpu, land, limits, cells).expect("a small land");
+    fn with_room<'a>(
+        gpu: &'a Gpu,
+        passes: &TessellationPasses,
+        land: &Land,
+        limits: Limits,
+        cells: u64,
+    ) -> OnDevice<'a> {
+        let tessellator = Tessellator::with_room(gpu, passes, land, limits, cells).expect("a small land");
         OnDevice { gpu, tessellator, told: None }
     }
 }
@@ -88,11 +94,12 @@ fn compare(land: &Land, limits: Limits, on_device: &mut OnDevice, view: &View) -
 #[test]
 fn the_coast_in_the_processors_triangles() {
     let Some((gpu, _alone)) = gpu() else { return };
+    let passes = TessellationPasses::new(&gpu);
     let land = coast::coast();
     let (mut same, mut apart) = (0, 0);
     for triangles in [500_000, 20_000, 700] {
         let limits = Limits { finest: land.finest_level(), triangles };
-        let mut on_device = OnDevice::new(&gpu, &land, limits);
+        let mut on_device = OnDevice::new(&gpu, &passes, &land, limits);
         for turn in 0..8 {
             let view = coast_shot(UVec2::new(960, 540)).view;
             let towards = DVec3::new((f64::from(turn) * 0.8).sin(), (f64::from(turn) * 0.8).cos(), -0.2);
@@ -117,6 +124,7 @@ fn cases() -> std::ops::Range<u64> {
 #[test]
 fn random_lands_keep_what_methods_promise() {
     let Some((gpu, _alone)) = gpu() else { return };
+    let passes = TessellationPasses::new(&gpu);
     let (mut same, mut apart, mut views) = (0, 0, 0);
     for seed in cases() {
         let mut random = Random::new(seed);
@@ -129,7 +137,7 @@ fn random_lands_keep_what_methods_promise() {
         // Coarser than the samples, as fine, or finer, which the device does not draw.
         let finest = (land.finest_level() + random.below(3) as u8).saturating_sub(1);
         let limits = Limits { finest, triangles: [300, 4_000, 20_000][random.below(3) as usize] };
-        let mut on_device = OnDevice::new(&gpu, &land, limits);
+        let mut on_device = OnDevice::new(&gpu, &passes, &land, limits);
         let limits = Limits { finest: finest.min(land.finest_level()), ..limits };
         let surface = surface_of(land.clone());
         for turn in 0..3 {
@@ -150,6 +158,7 @@ fn random_lands_keep_what_methods_promise() {
 #[test]
 fn full_lists_raise_the_tolerance() {
     let Some((gpu, _alone)) = gpu() else { return };
+    let passes = TessellationPasses::new(&gpu);
     let coast = coast::coast();
     let mut full = 0;
     for seed in 0..12 {
@@ -158,7 +167,7 @@ fn full_lists_raise_the_tolerance() {
         let limits = Limits { finest: land.finest_level(), triangles: 100_000 };
         let room = [64, 100, 600, 2000][seed as usize % 4];
         let surface = Surface { samples: None, ..surface_of(land.clone()) };
-        let mut on_device = OnDevice::with_room(&gpu, &land, limits, room);
+        let mut on_device = OnDevice::with_room(&gpu, &passes, &land, limits, room);
         for turn in 0..2 {
             let view = match seed {
                 0..4 => coast_shot(UVec2::new(960, 540)).view,
@@ -169,7 +178,7 @@ fn full_lists_raise_the_tolerance() {
             check(&mut on_device, &case, &mut random);
             let told = on_device.told.expect("told");
             assert!(u64::from(told.looked_at) <= room, "{label}: {told:?}");
-            let mut wanting = OnDevice::new(&gpu, &land, limits);
+            let mut wanting = OnDevice::new(&gpu, &passes, &land, limits);
             wanting.select(&land, &view, &mut Drawing::default()).expect("a view");
             let wanted = wanting.told.expect("told");
             if u64::from(wanted.looked_at) > room {
@@ -191,16 +200,17 @@ fn full_lists_raise_the_tolerance() {
 #[test]
 fn views_and_lands_that_cannot_be_are_refused() {
     let Some((gpu, _alone)) = gpu() else { return };
+    let passes = TessellationPasses::new(&gpu);
     let land = random_terrain(9, 9, &mut Random::new(1));
     let limits = Limits { finest: 30, triangles: usize::MAX };
-    let mut tessellator = Tessellator::new(&gpu, &land, limits).expect("a small land");
+    let mut tessellator = Tessellator::new(&gpu, &passes, &land, limits).expect("a small land");
     assert!(tessellator.limits().triangles as u64 * 48 <= gpu.device.limits().max_buffer_size);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let view = View::looking_at(DVec3::splat(f64::NAN), DVec3::ZERO, 1.0, UVec2::new(9, 9));
     assert_eq!(tessellator.tessellate(&gpu, &mut encoder, &view, None), Err(ViewError::NotFinite("an eye")));
     let side = gpu.device.limits().max_texture_dimension_2d as usize + 1;
     let raster = Raster::new(side, 2, DVec2::ONE, vec![0.0; 2 * side]).expect("valid");
-    let refused = Tessellator::new(&gpu, &Land::new(raster), limits).expect_err("too long").to_string();
+    let refused = Tessellator::new(&gpu, &passes, &Land::new(raster), limits).expect_err("too long").to_string();
     assert!(refused.contains("draw fewer samples"), "{refused}");
     assert!(gpu.check().is_ok(), "{:?}", gpu.check());
 }

@@ -16,6 +16,7 @@ use littoral_gpu::{
     Gpu, GpuError, Ground, Look, Painter, PassTimes, Renderer, Scenery, ShapeTexture, Triangles, Waves,
 };
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -96,11 +97,9 @@ struct Row {
     frame_ms: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     frame_99_ms: Option<f64>,
-    /// Of the frame, by the adapter's clock (medians): how far away the ground is, and the light of everything.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    surface_ms: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    shade_ms: Option<f64>,
+    /// Of the frame, by the adapter's clock (medians), pass by pass: `surface_ms`, `shade_ms` and so on.
+    #[serde(flatten)]
+    passes: BTreeMap<String, f64>,
     /// Choosing the mesh and bringing it to the adapter, which is not part of the frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     choose_ms: Option<f64>,
@@ -121,7 +120,7 @@ impl GpuBench {
             let inputs: Vec<_> = self.files.iter().map(PathBuf::as_path).collect();
             crate::render::check_output(out, &inputs)?;
         }
-        let gpu = Gpu::headless().map_err(|e| Failure::Work(e.to_string()))?;
+        let gpu = Gpu::headless().map_err(|e| Failure::Work(e.to_string()))?.timed();
         let most = gpu.device.limits().max_texture_dimension_2d;
         if self.size.max_element() > most {
             let UVec2 { x, y } = self.size;
@@ -133,7 +132,6 @@ impl GpuBench {
         let count: usize = places.iter().map(|place| place.views.len()).sum();
         let bar = progress(4 * count as u64, "drawing");
         let (mut views, mut sheet) = (Vec::new(), sheet::Sheet::new(self.size));
-        let mut has_pass_times = false;
         for place in &places {
             let scene = Scene {
                 lakes: place.lakes.as_ref(),
@@ -142,7 +140,6 @@ impl GpuBench {
             let stage = Stage::new(&scene);
             let mut painter = Painter::new(gpu.clone(), &stage).map_err(|e| Failure::Work(e.to_string()))?;
             let mut frames = Frames::new(&gpu, &stage)?;
-            has_pass_times = frames.renderer.times.is_some();
             for (name, view, waves) in &place.views {
                 let sea = place.sea.as_ref().filter(|_| *waves);
                 painter.set_waves(sea).map_err(|e| Failure::Work(e.to_string()))?;
@@ -170,7 +167,7 @@ impl GpuBench {
                 kind,
                 backend: gpu.adapter.backend.to_string(),
                 driver: format!("{} {}", gpu.adapter.driver, gpu.adapter.driver_info).trim().to_owned(),
-                has_pass_times,
+                has_pass_times: gpu.times.is_some(),
             },
             threads: rayon::current_num_threads(),
             width: self.size.x,
@@ -248,19 +245,18 @@ impl GpuBench {
         let once = Settings { samples: 1, ..settings };
         let times = self.times(&mut || {
             stage.render_sea(sea, view, &once, &|_| {});
-            Ok([0.0; PassTimes::PASSES.len()])
+            Ok(Default::default())
         })?;
-        let processor = times.row("processor, rays", false);
+        let processor = times.row("processor, rays");
         let again = stage.render_sea(sea, view, &Settings { seed: 1, ..settings }, &|_| {});
         let noise = against(Row { drawn_by: "processor, another seed", ..Row::default() }, &again);
         done();
 
         frames.prepare(stage, view);
-        let has_pass_times = frames.renderer.times.is_some();
         let times = self.times(&mut || frames.draw(None, view))?;
         let picture = painter.picture(stage, None, view, self.samples, &|_| {});
         let picture = picture.map_err(|e| Failure::Work(e.to_string()))?;
-        let rays = against(times.row("adapter, rays", has_pass_times), &picture);
+        let rays = against(times.row("adapter, rays"), &picture);
         sheet.add(&expected, &picture.display(&how));
         done();
 
@@ -278,17 +274,14 @@ impl GpuBench {
         done();
         let picture = painter.picture(stage, Some(&drawing.mesh), view, self.samples, &|_| {});
         let picture = picture.map_err(|e| Failure::Work(e.to_string()))?;
-        let row = Row { choose_ms, triangles: Some(triangles.len()), ..times.row("adapter, mesh", has_pass_times) };
+        let row = Row { choose_ms, triangles: Some(triangles.len()), ..times.row("adapter, mesh") };
         let mesh = against(row, &picture);
         done();
         Ok(vec![processor, rays, mesh, noise])
     }
 
     /// Times frames, which tell how long their passes took.
-    fn times(
-        &self,
-        frame: &mut dyn FnMut() -> Result<[f64; PassTimes::PASSES.len()], GpuError>,
-    ) -> Result<Times, Failure> {
+    fn times(&self, frame: &mut dyn FnMut() -> Result<Passes, GpuError>) -> Result<Times, Failure> {
         let mut frame = || frame().map_err(|e| Failure::Work(e.to_string()));
         frame()?; // caches, and what is made once
         let (begin, mut times) = (Instant::now(), Times::default());
@@ -298,13 +291,16 @@ impl GpuBench {
             let start = Instant::now();
             let passes = frame()?;
             times.frames.push(start.elapsed().as_secs_f64() * 1e3);
-            times.passes.iter_mut().zip(passes).for_each(|(times, time)| times.push(time));
+            times.passes.iter_mut().zip(passes).for_each(|(times, time)| times.extend(time));
         }
         times.frames.sort_by(f64::total_cmp);
         times.passes.iter_mut().for_each(|times| times.sort_by(f64::total_cmp));
         Ok(times)
     }
 }
+
+/// Times of the passes of a frame (ms), as far as they were recorded.
+type Passes = [Option<f64>; PassTimes::PASSES.len()];
 
 /// Times of frames and of their passes (ms), sorted.
 #[derive(Default)]
@@ -314,20 +310,19 @@ struct Times {
 }
 
 impl Times {
-    fn row(&self, drawn_by: &'static str, has_pass_times: bool) -> Row {
+    fn row(&self, drawn_by: &'static str) -> Row {
         let at = |times: &[f64], share: f64| {
-            times.get(((times.len() as f64 * share) as usize).min(times.len() - 1)).copied()
+            times.get(((times.len() as f64 * share) as usize).min(times.len().saturating_sub(1))).copied()
         };
-        let pass = |number: usize| at(&self.passes[number], 0.5).filter(|_| has_pass_times);
-        Row {
-            drawn_by,
-            frame_ms: at(&self.frames, 0.5),
-            frame_99_ms: at(&self.frames, 0.99),
-            surface_ms: pass(0),
-            shade_ms: pass(1),
-            ..Row::default()
-        }
+        let passes = PassTimes::PASSES.iter().zip(&self.passes);
+        let passes = passes.filter_map(|(name, times)| Some((key(name), at(times, 0.5)?))).collect();
+        Row { drawn_by, frame_ms: at(&self.frames, 0.5), frame_99_ms: at(&self.frames, 0.99), passes, ..Row::default() }
     }
+}
+
+/// What a pass is called in JSON.
+fn key(pass: &str) -> String {
+    format!("{}_ms", pass.replace(' ', "_"))
 }
 
 /// Draws frames without reading them back.
@@ -341,13 +336,13 @@ struct Frames {
 impl Frames {
     fn new(gpu: &Gpu, stage: &Stage) -> Result<Frames, Failure> {
         let failed = |e: &dyn std::fmt::Display| Failure::Work(e.to_string());
-        let (Some(tables), Datum::Plane { origin, size }) = (stage.tables(), stage.land().datum()) else {
-            return Err(Failure::Work("expected land on a plane in colours, got another".into()));
+        let Datum::Plane { origin, size } = stage.land().datum() else {
+            return Err(Failure::Work("expected land on a plane, got another".into()));
         };
+        let tables = stage.tables();
         let height = f64::from(stage.land().height_range().high).max(2.0);
         let scenery = Scenery::new(gpu, &tables, (origin, size), (height, &stage.sky_table(height)));
-        let mut renderer = Renderer::new(gpu, wgpu::TextureFormat::Rgba8Unorm);
-        renderer.times = PassTimes::new(gpu);
+        let renderer = Renderer::new(gpu, wgpu::TextureFormat::Rgba8Unorm);
         Ok(Frames {
             gpu: gpu.clone(),
             renderer,
@@ -364,19 +359,19 @@ impl Frames {
     }
 
     /// One frame by triangles, or by rays; how long its passes took (ms).
-    fn draw(&mut self, triangles: Option<&Triangles>, view: &View) -> Result<[f64; PassTimes::PASSES.len()], GpuError> {
+    fn draw(&mut self, triangles: Option<&Triangles>, view: &View) -> Result<Passes, GpuError> {
         let gpu = &self.gpu;
         let ground = triangles.map_or(Ground::Rays { shape: &self.shape, pixels: 0.0 }, Ground::Triangles);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         self.renderer.draw(gpu, &mut encoder, &self.scenery, ground, view, Look::default());
-        if let Some(times) = &self.renderer.times {
+        if let Some(times) = &gpu.times {
             times.keep(&mut encoder);
         }
         gpu.queue.submit([encoder.finish()]);
         let finished = gpu.device.poll(wgpu::PollType::wait_indefinitely());
         finished.map_err(|e| GpuError::Lost { adapter: gpu.adapter.name.clone(), reason: e.to_string() })?;
         gpu.check()?;
-        self.renderer.times.as_ref().map_or(Ok(Default::default()), |times| times.read(gpu))
+        gpu.times.as_ref().map_or(Ok(Default::default()), |times| times.read(gpu))
     }
 }
 
@@ -410,8 +405,11 @@ impl Answer {
         } else if !has_pass_times {
             text += "This adapter has no clock for its passes\n";
         }
-        let passes = if *has_pass_times { format!(" {:>10} {:>10}", "surface", "shade") } else { String::new() };
         for viewed in &self.views {
+            // Those of any row.
+            let timed = |pass: &&str| viewed.rows.iter().any(|row| row.passes.contains_key(&key(pass)));
+            let timed: Vec<&str> = PassTimes::PASSES.into_iter().filter(timed).collect();
+            let passes: String = timed.iter().map(|pass| format!(" {pass:>11}")).collect();
             text += &format!("\n{}, {}\n", viewed.land, viewed.view);
             text += &format!(
                 "  {:<24} {:>9} {:>9}{passes} {:>10} {:>10} {:>11} {:>8}\n",
@@ -420,10 +418,8 @@ impl Answer {
             for row in &viewed.rows {
                 let shown =
                     |number: Option<f64>, decimals: usize| number.map_or(String::new(), |n| format!("{n:.decimals$}"));
-                let passes = match has_pass_times {
-                    true => format!(" {:>10} {:>10}", shown(row.surface_ms, 3), shown(row.shade_ms, 3)),
-                    false => String::new(),
-                };
+                let time = |pass: &&str| format!(" {:>11}", shown(row.passes.get(&key(pass)).copied(), 3));
+                let passes: String = timed.iter().map(time).collect();
                 text += &format!(
                     "  {:<24} {:>9} {:>9}{passes} {:>10} {:>10} {:>11} {:>8}\n",
                     row.drawn_by,

@@ -1,5 +1,6 @@
 //! What a shader needs to know of the tiles to find a place in them.
 
+use crate::bindings;
 use glam::DVec2;
 use littoral::waves::cascades::{Breakers, Cascades, Tile};
 
@@ -77,7 +78,7 @@ pub fn place(origin: DVec2, tiles: &[Tile], into: &mut [SampleTile]) {
 
 /// What `sea_sample.wgsl` is bound to.
 pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let tiles = super::buffer(wgpu::BufferBindingType::Storage { read_only: true }, false);
+    let texels = bindings::texels(wgpu::TextureViewDimension::D2Array);
     let stages = wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE;
-    super::group_layout(device, stages, [tiles, super::sampled(), super::sampled()])
+    bindings::group_layout(device, "sea", stages, &[bindings::storage(true), texels, texels])
 }

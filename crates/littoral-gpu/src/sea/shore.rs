@@ -1,6 +1,6 @@
 //! A sea over a bed on the device: nodes and waves of a [`ShoreSea`](littoral::waves::ShoreSea), and what shelters the tiles, for `sea_shore.wgsl`.
 
-use crate::{Gpu, GpuError};
+use crate::{Gpu, GpuError, bindings};
 use glam::DVec2;
 use littoral::waves::{Shelter, ShoreTables, ShoreWave};
 use wgpu::util::DeviceExt;
@@ -100,7 +100,7 @@ impl GpuShore {
             mapped_at_creation: false,
         });
         let buffers = [&places, &phases, &records, &known, &lower].map(|buffer| buffer.as_entire_binding());
-        let group = super::group(device, &layout(device), buffers);
+        let group = bindings::group(device, "shore", &layout(device), buffers);
         Ok(GpuShore { waves, place, nodes, factors, places, phases, group })
     }
 
@@ -131,8 +131,7 @@ impl GpuShore {
 
 /// The layout of that group.
 pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let read = || super::buffer(wgpu::BufferBindingType::Storage { read_only: true }, false);
     let stages = wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE;
-    let uniform = super::buffer(wgpu::BufferBindingType::Uniform, false);
-    super::group_layout(device, stages, [uniform, read(), read(), read(), read()])
+    let read = bindings::storage(true);
+    bindings::group_layout(device, "shore", stages, &[bindings::uniform(false), read, read, read, read])
 }

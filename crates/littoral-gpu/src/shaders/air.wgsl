@@ -1,14 +1,14 @@
 // Sky, haze, and the light of both: the engine's `picture::atmosphere` and `picture::skylight`, from the tables that they make.
 
-@group(0) @binding(6) var smooth_sampler: sampler;
+@group(1) @binding(12) var smooth_sampler: sampler;
 // Distances × elevations × (azimuths of Rayleigh, Mie and higher orders), as the eye sees them, and as the land does.
-@group(0) @binding(7) var eye_light: texture_3d<f32>;
-@group(0) @binding(8) var eye_through: texture_2d<f32>;
-@group(0) @binding(9) var land_light: texture_3d<f32>;
+@group(1) @binding(5) var eye_light: texture_3d<f32>;
+@group(1) @binding(6) var eye_through: texture_2d<f32>;
+@group(1) @binding(7) var land_light: texture_3d<f32>;
 // Nine harmonics of light from all sides.
-@group(0) @binding(10) var skylight_map: texture_2d_array<f32>;
+@group(1) @binding(8) var skylight_map: texture_2d_array<f32>;
 // By length of path in water: its own radiance, and the share left of the bed's light; sunlight by height. A row each.
-@group(0) @binding(11) var media_map: texture_2d<f32>;
+@group(1) @binding(9) var media_map: texture_2d<f32>;
 
 const AZIMUTHS = 16.0;
 const ELEVATIONS = 160.0;
@@ -61,8 +61,11 @@ fn veil(direction: vec3f, distance: f32) -> Veil {
     return Veil(scattered(eye_light, place, direction), max(through, vec3f(0.0)));
 }
 
-// Radiance of the sky as the eye sees it, with the sun's disc.
+// Radiance of the sky as the eye sees it, with the sun's disc; on paper there is none.
 fn sky_seen(direction: vec3f) -> vec3f {
+    if is_paper() {
+        return frame.mist.rgb;
+    }
     let seen = veil(direction, 1e9);
     let edge = cos(frame.sun.w);
     let inside = saturate((dot(direction, frame.sun.xyz) - edge) / (0.1 * (1.0 - edge)));

@@ -91,6 +91,9 @@ fn wall_of(from_: vec3f, direction: vec3f) -> Wall {
 
 // Light of the cut (kcd/m²), seen along `direction`.
 fn wall_seen(wall: Wall, direction: vec3f) -> vec3f {
+    if is_paper() {
+        return frame.mist.rgb * (0.62 + 0.12 * max(dot(wall.normal, frame.sun.xyz), 0.0));
+    }
     let known = known_at(wall.rel);
     if wall.z > wall.ground {
         // Looking into water through its side: it glows as deep water does, less the deeper the less light comes down.
@@ -111,6 +114,9 @@ fn wall_seen(wall: Wall, direction: vec3f) -> vec3f {
 
 // Light of the floor, in the block's shadow or out of it.
 fn floor_seen(rel: vec3f) -> vec3f {
+    if is_paper() {
+        return frame.mist.rgb;
+    }
     let beside = clamp(rel.xy, frame.block.xy, frame.block.zw);
     let away = length(rel.xy - beside);
     let thickness = frame.floor.y;

@@ -1,7 +1,7 @@
 // From radiance to the screen: the engine's `picture::display`.
 
 @group(0) @binding(0) var radiance_map: texture_2d<f32>;
-// What radiance is multiplied by; whether the target encodes sRGB by itself; pixels of the picture for each of the target.
+// What radiance is multiplied by, and the medium: 0 film, 1 print, 2 paper; whether the target encodes sRGB by itself; pixels of the picture for each of the target.
 struct Shown {
     scale: vec4f,
     how: vec4f,
@@ -37,6 +37,18 @@ fn film(light: vec3f) -> vec3f {
     return saturate(outset * saturate(grey + (contrasted - grey) * 1.28));
 }
 
+// Reflectance to values encoded for the screen, true to colour but for what is nearly white and brighter.
+fn print(light: vec3f) -> vec3f {
+    const SHOULDER = 0.75;
+    let over = max(light - SHOULDER, vec3f(0.0)) / (1.0 - SHOULDER);
+    return encoded(clamp(light, vec3f(0.0), vec3f(SHOULDER)) + (1.0 - SHOULDER) * (1.0 - exp(-over)));
+}
+
+fn encoded(linear: vec3f) -> vec3f {
+    let v = saturate(linear);
+    return select(1.055 * pow(v, vec3f(1.0 / 2.4)) - 0.055, 12.92 * v, v <= vec3f(0.0031308));
+}
+
 fn radiance_at(at: vec2i) -> vec3f {
     let last = vec2i(textureDimensions(radiance_map)) - 1;
     return textureLoad(radiance_map, clamp(at, vec2i(0), last), 0).rgb;
@@ -53,10 +65,16 @@ fn display(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let top = mix(radiance_at(i), radiance_at(i + vec2i(1, 0)), f.x);
         radiance = mix(top, mix(radiance_at(i + vec2i(0, 1)), radiance_at(i + 1), f.x), f.y);
     }
-    let encoded = film(radiance * shown.scale.rgb);
-    if shown.how.x == 0.0 {
-        return vec4f(encoded, 1.0);
+    let light = radiance * shown.scale.rgb;
+    var values: vec3f;
+    switch u32(shown.scale.w) {
+        case 0u: { values = film(light); }
+        case 1u: { values = print(light); }
+        default: { values = encoded(light); }
     }
-    let linear = select(pow((encoded + 0.055) / 1.055, vec3f(2.4)), encoded / 12.92, encoded <= vec3f(0.04045));
+    if shown.how.x == 0.0 {
+        return vec4f(values, 1.0);
+    }
+    let linear = select(pow((values + 0.055) / 1.055, vec3f(2.4)), values / 12.92, values <= vec3f(0.04045));
     return vec4f(linear, 1.0);
 }

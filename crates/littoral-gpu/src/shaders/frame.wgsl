@@ -46,7 +46,7 @@ struct Frame {
     land: vec4f,
     // The eye among the points of the light from the sky; points a metre.
     skylight: vec4f,
-    // Radiance of mist (kcd/m²); its level over the eye (m).
+    // Radiance of mist (kcd/m²), or reflectance of a map's sheet; its level over the eye (m).
     mist: vec4f,
     // Tree line and snow line (m); greatest height of the eye in the sky's table (m).
     climate: vec4f,
@@ -54,7 +54,7 @@ struct Frame {
     block: vec4f,
     // Its floor over the eye (m), its thickness (m), whether there is one, whether any of it is cut away.
     floor: vec4f,
-    // What the ground is seen as: 0 nature, 1 tints, 2 a picture; reflectance of the floor; the eye in the picture.
+    // What the ground is seen as: 0 nature, 1 tints, 2 a picture, 3 a shaded relief; reflectance of the floor; the eye in the picture.
     coat: vec4f,
     // Heights of the lowest ground, of the land's foot and of the highest ground (m); by how much slopes are steepened.
     tint: vec4f,

@@ -1,12 +1,12 @@
 // The smooth ground at any fineness: the engine's `picture::ground`. Slopes are central differences, blended between samples, on the level of a
 // pyramid of means that fits the footprint.
 
-@group(0) @binding(1) var fine_heights: texture_2d<f32>;
+@group(1) @binding(0) var fine_heights: texture_2d<f32>;
 // All coarser levels side by side.
-@group(0) @binding(2) var coarse_heights: texture_2d<f32>;
+@group(1) @binding(1) var coarse_heights: texture_2d<f32>;
 // Share known, and what was cut away; tangent of the horizon towards the sun, and height of trees (m).
-@group(0) @binding(3) var known_map: texture_2d<f32>;
-@group(0) @binding(5) var horizon_map: texture_2d<f32>;
+@group(1) @binding(2) var known_map: texture_2d<f32>;
+@group(1) @binding(4) var horizon_map: texture_2d<f32>;
 
 struct Surface {
     height: f32,

@@ -1,7 +1,7 @@
 // Objects on land and water, lit where they are: the engine's `picture::things`.
 
 // What was drawn so far: radiance and distance, 0 for the sky.
-@group(0) @binding(20) var behind_map: texture_2d<f32>;
+@group(2) @binding(0) var behind_map: texture_2d<f32>;
 
 struct Corner {
     @location(0) position: vec3f,

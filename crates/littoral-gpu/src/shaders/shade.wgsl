@@ -1,9 +1,9 @@
 // Every pixel lit once: from how far away things are to the light they send. The engine's `picture::shade`.
 
-@group(0) @binding(15) var depth_map: texture_depth_2d;
+@group(2) @binding(0) var depth_map: texture_depth_2d;
 // As far as the sea is, and what its waves are like there: see wave_seen.wgsl.
-@group(0) @binding(18) var sea_depth_map: texture_depth_2d;
-@group(0) @binding(19) var sea_map: texture_2d<u32>;
+@group(2) @binding(1) var sea_depth_map: texture_depth_2d;
+@group(2) @binding(2) var sea_map: texture_2d<u32>;
 
 @vertex
 fn everywhere(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
@@ -38,6 +38,10 @@ struct Ground {
 
 // Called from one place only: it is nearly all of the shader.
 fn ground_at(piece: Piece) -> Ground {
+    if is_paper() {
+        let reflectance = relief_at(piece.rel, piece.z, piece.footprint);
+        return Ground(Surface(), Material(reflectance, vec3f(0.0, 0.0, 1.0), 1.0, 0.0));
+    }
     let surface = surface_at(piece.rel, piece.footprint);
     if is_map() {
         return Ground(surface, coated(tint_at(piece.rel, piece.z), surface, piece.footprint, frame.tint.w));
@@ -63,6 +67,9 @@ fn ground_at(piece: Piece) -> Ground {
 // Light that a piece of ground throws back (kcd/m²), where the eye looks at it along `direction`.
 fn lit(piece: Piece, ground: Ground, direction: vec3f) -> vec3f {
     let material = ground.material;
+    if is_paper() {
+        return mix(frame.mist.rgb, material.albedo, known_at(piece.rel));
+    }
     let smooth_normal = normal_of_slope(ground.surface.slope);
     var light = material.albedo / PI * irradiance_at(piece.rel, material.normal) * material.openness;
     if material.wet > 0.0 {

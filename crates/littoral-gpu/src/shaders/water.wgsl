@@ -1,11 +1,11 @@
 // Light on and in water: the engine's `picture::sea`, and what of `picture::shade` belongs to it.
 
 // Red: 1 where ground below the water's level is wet, at least a half where waves may get to ground above it; green: distance to the shore of a lake in samples, over 255, 0 where there is none.
-@group(0) @binding(12) var basin_map: texture_2d<f32>;
+@group(1) @binding(10) var basin_map: texture_2d<f32>;
 // Beyond the land: depth (m) and share of water, by place along the border and distance from it.
-@group(0) @binding(13) var rim_map: texture_2d<f32>;
+@group(1) @binding(11) var rim_map: texture_2d<f32>;
 // How high swash reaches above still water (m).
-@group(0) @binding(14) var run_up_map: texture_2d<f32>;
+@group(3) @binding(0) var run_up_map: texture_2d<f32>;
 
 const INDEX = 1.34;
 

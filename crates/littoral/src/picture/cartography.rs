@@ -75,15 +75,30 @@ impl Tints {
         (0.32 / self.slope).max(1.0)
     }
 
-    /// The same in numbers.
+    /// The same on a shaded relief: a typical slope is a good grey.
+    fn exaggeration(&self) -> f32 {
+        0.45 / self.slope
+    }
+
+    /// Heights (m) of the lowest ground, of the foot of the land and of the highest ground.
+    fn heights(&self) -> [f32; 3] {
+        [self.low, self.level.max(self.low), self.high]
+    }
+
+    /// Tints in numbers.
     pub fn coat(&self) -> Coat<'static> {
         Coat::Tint {
             land: LAND_RUN.to_vec(),
             bed: BED_RUN.to_vec(),
             lake: LAKE_TINT,
-            heights: [self.low, self.level.max(self.low), self.high],
+            heights: self.heights(),
             steepening: self.steepening(),
         }
+    }
+
+    /// A shaded relief in numbers.
+    pub fn relief(&self) -> Coat<'static> {
+        Coat::Relief { lake: LAKE_PAPER, heights: self.heights(), steepening: self.exaggeration() }
     }
 
     /// Albedo (linear) of ground at a height (m); `wet` says whether water lies over it where it is below the level.
@@ -133,6 +148,8 @@ fn hsl(hue: f32, saturation: f32, lightness: f32) -> Vec3 {
 pub const LAKE_TINT: Vec3 = Vec3::new(0.33, 0.56, 0.72);
 /// Reflectance (linear) of lakes on a shaded relief.
 pub const LAKE_PAPER: Vec3 = Vec3::new(0.52, 0.69, 0.80);
+/// Reflectance (linear) of the sheet that a shaded relief is drawn on.
+pub const SHEET: Vec3 = Vec3::new(0.90, 0.89, 0.86);
 
 /// Reflectance (linear) of a shaded relief at a place, for a pixel of this footprint (m). `to_sun` is the main light's
 /// direction on the map.
@@ -141,15 +158,14 @@ pub fn relief(ground: &Ground, tints: &Tints, at: DVec2, height: f32, footprint:
     let foot = if below { tints.low } else { tints.level.max(tints.low) };
     let top = if below { tints.level } else { tints.high };
     let elevation = ((height - foot) / (top - foot).max(1e-3)).clamp(0.0, 1.0);
-    // Slopes of three sizes; the scale of heights is chosen so that a typical slope is a good grey.
+    // Slopes of three sizes.
     let size = ground.spacing().max(footprint);
     let extent = ground.land.extent().min_element() as f32;
-    let exaggeration = 0.45 / tints.slope;
     let mut slope = Vec2::ZERO;
     for (scale, weight) in [(1.0, 0.50), (5.0, 0.32), (18.0, 0.18)] {
         slope += ground.surface(at, (size * scale).min(0.05 * extent)).slope * weight;
     }
-    slope *= exaggeration;
+    slope *= tints.exaggeration();
     let normal = Vec3::new(-slope.x, -slope.y, 1.0).normalize();
     // Four lights over a quarter turn to either side of the main one, weighed by how far the slope turns from each.
     let aspect = (-slope).normalize_or(to_sun);

@@ -8,7 +8,7 @@
 //! Everything else (light, shadows, mirrors, air) is that of the exact surface: a picture of a mesh differs from the exact one by the mesh alone.
 
 use super::stage::{Caster, Stage};
-use super::{Picture, Settings};
+use super::{Drape, Picture, Settings, Style};
 use crate::field::{HeightField, Land, Sea};
 use crate::lod::Mesh;
 use crate::raycast::{LocalRay, RayCaster};
@@ -318,6 +318,11 @@ impl Stage<'_> {
     /// shown as mist, or a side of the block.
     pub fn land(&self) -> &Land {
         &self.ground.land
+    }
+
+    /// The picture that the ground is seen as, if it is.
+    pub fn drape(&self) -> Option<&Drape> {
+        self.scene.drape.filter(|_| self.scene.style == Style::Image)
     }
 
     /// What `view` sees when meshes stand for the surfaces they are of. Shadows and mirrors stay those of the exact ground.

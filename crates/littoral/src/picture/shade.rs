@@ -3,7 +3,7 @@
 use super::Style;
 use super::atmosphere::Veil;
 use super::block::Wall;
-use super::cartography::{LAKE_PAPER, LAKE_TINT, relief};
+use super::cartography::{LAKE_PAPER, LAKE_TINT, SHEET, relief};
 use super::grain::step;
 use super::ground::Surface;
 use super::natural::{Material, Site, natural};
@@ -209,7 +209,6 @@ impl Stage<'_> {
 
     /// A cartographer's paper: no sun, no air, only tones.
     fn painted(&self, lens: &Lens, direction: Vec3, ahead: &Ahead) -> Shaded {
-        let paper = Vec3::new(0.90, 0.89, 0.86);
         let light = match *ahead {
             Ahead::Ground { position } => {
                 let at = position.truncate();
@@ -218,10 +217,10 @@ impl Stage<'_> {
                 let to_sun = self.sun.truncate().normalize_or(Vec2::new(-0.7, 0.7));
                 let ground = relief(&self.ground, &self.tints, at, position.z as f32, footprint, to_sun, wet);
                 let ground = if self.in_lake(at) { LAKE_PAPER } else { ground };
-                paper.lerp(ground, self.ground.known(at))
+                SHEET.lerp(ground, self.ground.known(at))
             }
-            Ahead::Wall(wall) => paper * (0.62 + 0.12 * wall.normal.dot(self.sun).max(0.0)),
-            _ => paper,
+            Ahead::Wall(wall) => SHEET * (0.62 + 0.12 * wall.normal.dot(self.sun).max(0.0)),
+            _ => SHEET,
         };
         Shaded { light, through: Vec3::ONE, sky: matches!(ahead, Ahead::Sky), ..Shaded::default() }
     }

@@ -3,6 +3,7 @@
 use super::Style;
 use super::atmosphere::{AZIMUTHS, DISTANCES, ELEVATIONS, Sky};
 use super::block::{MIST, PAPER};
+use super::cartography::SHEET;
 use super::display::Medium;
 use super::horizon::horizon;
 use super::stage::{HIGHEST_EYE, Stage};
@@ -55,6 +56,15 @@ pub enum Coat<'a> {
         /// By how much slopes are steepened for the light on them.
         steepening: f32,
     },
+    /// A cartographer's shaded relief: reflectance, whatever the light. Sheet and mist are [`Tables::mist`].
+    Relief {
+        /// Reflectance of lakes.
+        lake: Vec3,
+        /// Heights (m) of the lowest ground, of the foot of the land and of the highest ground.
+        heights: [f32; 3],
+        /// By how much slopes are steepened for the shades.
+        steepening: f32,
+    },
     /// A picture laid over it; grey beyond that.
     Image(&'a Drape),
 }
@@ -102,7 +112,7 @@ pub struct Tables<'a> {
     pub sun_radius: f32,
     /// Radiance of its disc above the air (kcd/m²).
     pub disc: Vec3,
-    /// Radiance of mist (kcd/m²), and the height of the level it lies at beyond the land (m).
+    /// Radiance of mist (kcd/m²), or reflectance of a map's sheet, and the height of the level it lies at beyond the land (m).
     pub mist: (Vec3, f64),
     /// Whether distance veils things.
     pub veils_distance: bool,
@@ -151,11 +161,12 @@ impl Tables<'_> {
 const RIM: [usize; 2] = [1024, 40];
 
 impl Stage<'_> {
-    /// The stage in numbers; `None` for what only pictures by rays can show so far: shaded relief.
-    pub fn tables(&self) -> Option<Tables<'_>> {
+    /// The stage in numbers.
+    pub fn tables(&self) -> Tables<'_> {
         let scene = &self.scene;
+        let is_paper = scene.style == Style::Relief;
         let coat = match (scene.style, scene.drape) {
-            (Style::Relief, _) => return None,
+            (Style::Relief, _) => self.tints.relief(),
             (Style::Tint, _) => self.tints.coat(),
             (Style::Image, Some(drape)) => Coat::Image(drape),
             (Style::Natural | Style::Image, _) => Coat::Natural,
@@ -191,7 +202,7 @@ impl Stage<'_> {
             let (columns, rows, spacing) = (raster.columns(), raster.rows(), raster.spacing());
             Lattice { columns, rows, origin: land.0, spacing, values: values.to_vec() }
         };
-        Some(Tables {
+        Tables {
             coat,
             medium: self.medium(),
             floor: if self.is_map() { PAPER } else { MIST },
@@ -218,15 +229,15 @@ impl Stage<'_> {
             sun: self.sun,
             sun_radius: scene.sun.angular_radius as f32,
             disc: self.sky.disc_radiance(),
-            mist: (self.mist, self.ground.mist),
+            mist: (if is_paper { SHEET } else { self.mist }, self.ground.mist),
             white: self.white(),
             block: self.ground.block.map(|block| block.slab()),
             cut_away: self.ground.cut_away_samples().to_vec(),
-            veils_distance: scene.air.veils_distance,
+            veils_distance: scene.air.veils_distance && !is_paper,
             lines: [scene.climate.tree_line, scene.climate.snow_line],
             land_sky: self.sky_table(f64::from(self.middle)).light,
             heights,
-        })
+        }
     }
 
     /// The sky from a height (m).
