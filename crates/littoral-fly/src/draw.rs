@@ -7,7 +7,7 @@ use crate::scene::{Choice, Frame};
 use crate::settings::{Settings, Show, Split, Style};
 use glam::{Mat4, UVec2, Vec2};
 use littoral::field::{HeightField, Sea};
-use littoral::picture::Stage;
+use littoral::picture::{Placed, Stage};
 use littoral::space::{Datum, View};
 use littoral_gpu::{Gpu, Ground, Look, ShapeTexture, Triangles, Waves};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -65,6 +65,13 @@ impl Scenery {
             full.lock().unwrap_or_else(PoisonError::into_inner).follow_waves(gpu, sea);
             self.changes.fetch_add(1, Ordering::Relaxed);
         }
+    }
+
+    /// Draws these objects from now on. Where there are too many, those before stay; the sentence says why.
+    pub fn set_objects(&self, gpu: &Gpu, placed: &[Placed]) -> Result<(), String> {
+        let Some(full) = &self.full else { return Ok(()) };
+        self.changes.fetch_add(1, Ordering::Relaxed);
+        full.lock().unwrap_or_else(PoisonError::into_inner).set_objects(gpu, placed).map_err(|e| e.to_string())
     }
 
     /// Makes the ground ready for rays. What cannot be is drawn as triangles; the sentence says why, once.

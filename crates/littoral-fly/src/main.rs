@@ -32,6 +32,7 @@ use camera::Mode;
 use clap::Parser;
 use glam::UVec2;
 use littoral::lod::Method;
+use littoral_data::ObjectOrder;
 use settings::{Detail, Settings, Show, Split, Style};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -53,6 +54,7 @@ use std::process::ExitCode;
   littoral-fly --method roam --show both       a method of detail at work
   littoral-fly --method strips --against whole two methods, and how far apart their pictures are
   littoral-fly --sea beaufort=8,from=240 --mode boat
+  littoral-fly --object lighthouse@3030,1310   with a lighthouse on the rock
   littoral-fly --smoke 200 --size 1280x720     fly 200 frames, print the medians as JSON
 
 In the window: W S A D and the mouse fly, the wheel sets the speed, F1 lists all keys. F12 saves
@@ -66,6 +68,10 @@ struct Arguments {
     /// Width and height of the window in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "1280x720")]
     size: UVec2,
+    /// A thing on the land or afloat: a glTF file, or lighthouse or buoy, which are built in; where it stands, in the coordinates of the height files;
+    /// how many degrees it is turned clockwise, and how many times larger it is. Can be given many times; natural pictures show it
+    #[arg(long, value_name = "FILE@X,Y[,HEADING[,SCALE]]")]
+    object: Vec<ObjectOrder>,
     /// A path to be flown at once
     #[arg(long, value_name = "FILE.toml")]
     path: Option<PathBuf>,

@@ -308,6 +308,8 @@ fn fly(
             let mut answered: Option<Wish> = None;
             // Which waves natural pictures show: whether any, and of which instant (s).
             let mut seen = (false, f64::NAN);
+            // With which sea objects were placed: whether there was any, and its instant (s).
+            let mut placed: Option<(bool, f64)> = None;
             loop {
                 if wish.look != look {
                     break;
@@ -365,6 +367,13 @@ fn fly(
                     if let Err(problem) = show_waves(&scenery, gpu, waves.as_ref(), &mut seen) {
                         voice.tell(News::Note(problem));
                     }
+                    let tide = (waves.is_some(), waves.as_ref().map_or(0.0, Sea::time));
+                    if !subject.objects.is_empty() && placed != Some(tide) {
+                        if let Err(problem) = scenery.set_objects(gpu, &stage.placed(waves.as_ref())) {
+                            voice.tell(News::Note(problem));
+                        }
+                        placed = Some(tide);
+                    }
                     match made {
                         Ok(frame) => voice.tell(News::Frame(Box::new(Frame { serial, number, grey, ..frame }))),
                         Err(problem) => voice.tell(News::Note(problem)),
@@ -388,6 +397,7 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
     let climate = subject.lonlat().map_or_else(Climate::default, |lonlat| Climate::at_latitude(lonlat.y.to_radians()));
     Scene {
         lakes: subject.lakes.as_ref(),
+        objects: &subject.objects,
         sun: look.sun.unwrap_or(suits.sun),
         air,
         style: picture::Style::Natural,

@@ -5,6 +5,7 @@ use crate::coat::PICTURE_BYTES;
 use crate::device::{Gpu, GpuError};
 use crate::expander::Expander;
 use crate::frame::Look;
+use crate::objects::TooManyObjects;
 use crate::rays::{ShapeError, ShapeTexture};
 use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
@@ -14,7 +15,7 @@ use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
 use littoral::field::{HeightField, Land, Sea};
 use littoral::lod::{Drawing, Limits, Mesh, NestedBounds, ViewError};
-use littoral::picture::{Medium, Picture, Stage};
+use littoral::picture::{Medium, Picture, Placed, Stage};
 use littoral::space::{Datum, View};
 
 /// Paints what views see of a stage, as [`Stage::render_meshes`] does.
@@ -90,6 +91,9 @@ pub enum PainterError {
     /// Waves that it does not draw.
     #[error(transparent)]
     Waves(#[from] WavesError),
+    /// Too many objects, or too large ones.
+    #[error(transparent)]
+    Objects(#[from] TooManyObjects),
     /// Something that it does not draw.
     #[error("expected land on a plane, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
@@ -148,6 +152,20 @@ impl Painter {
     /// Goes on to the instant at which the sea of [`Painter::set_waves`] stands now.
     pub fn follow_waves(&mut self, sea: &Sea) {
         self.scenery.follow_waves(&self.gpu, sea);
+    }
+
+    /// Draws these objects from here on, in place of those before: [`Stage::placed`].
+    ///
+    /// # Errors
+    /// If they do not fit into the device's buffers, or the device was lost.
+    pub fn set_objects(&mut self, placed: &[Placed]) -> Result<(), PainterError> {
+        self.scenery.set_objects(&self.gpu, placed)?;
+        Ok(self.gpu.check()?)
+    }
+
+    /// How many triangles of objects the last picture took, each time that it looked.
+    pub fn object_triangles(&self) -> u64 {
+        self.renderer.object_triangles()
     }
 
     /// What paints.

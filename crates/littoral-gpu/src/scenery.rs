@@ -4,11 +4,12 @@ use crate::bindings;
 use crate::coat::{GpuCoat, PICTURE_BYTES};
 use crate::device::Gpu;
 use crate::frame::LEVELS;
+use crate::objects::{Objects, TooManyObjects};
 use crate::waves::Waves;
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
 use littoral::field::{HeightField, Sea};
-use littoral::picture::{Lattice, Medium, SkyTable, Slab, Stage, Tables};
+use littoral::picture::{Lattice, Medium, Placed, SkyTable, Slab, Stage, Tables};
 use littoral::space::View;
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{TextureDimension, TextureFormat};
@@ -25,6 +26,7 @@ pub struct Scenery {
     pub(crate) coat: GpuCoat,
     pub(crate) medium: Medium,
     pub(crate) waves: Option<Waves>,
+    pub(crate) objects: Objects,
     /// Of the lattice that meshes' vertices are on (m), and metres a step.
     pub(crate) origin: DVec2,
     pub(crate) step: DVec2,
@@ -191,6 +193,7 @@ impl Scenery {
             coat,
             medium: tables.medium,
             waves: None,
+            objects: Objects::default(),
             origin: datum.0,
             step: datum.1 / (1u64 << 30) as f64,
             map_origin: finest.origin,
@@ -270,6 +273,14 @@ impl Scenery {
         if let Some(waves) = &mut self.waves {
             waves.follow(gpu, sea);
         }
+    }
+
+    /// Draws these objects from here on, in place of those before: [`Stage::placed`].
+    ///
+    /// # Errors
+    /// If they do not fit into the device's buffers; then nothing changes.
+    pub fn set_objects(&mut self, gpu: &Gpu, placed: &[Placed]) -> Result<(), TooManyObjects> {
+        self.objects.set(gpu, placed)
     }
 
     /// How high swash reaches: what the pass that shades is bound to.
