@@ -3,7 +3,8 @@
 use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DAffine2, DVec2, DVec3};
 use littoral::field::{Land, Raster, Window};
-use littoral_data::{Code, Crs, Dem, Encoding, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
+use littoral::picture::Drape;
+use littoral_data::{Code, Crs, Dem, Encoding, Error, Georeference, Info, LoadOptions, Source, Survey, VerticalDatum};
 use std::path::{Path, PathBuf};
 
 /// How files are read, where they do not say it themselves.
@@ -249,11 +250,6 @@ impl Frame {
         self.georeference.crs.clone()
     }
 
-    /// Longitude and latitude (degrees) of coordinates.
-    pub fn lonlat(&self, crs: DVec2) -> Result<DVec2, String> {
-        self.georeference.lonlat_from_crs(crs)
-    }
-
     /// Distance between samples (m).
     pub fn spacing(&self) -> DVec2 {
         self.georeference.spacing()
@@ -349,6 +345,11 @@ impl Frame {
     /// Longitude and latitude of the middle (degrees), where they can be known.
     pub fn place(&self) -> Option<DVec2> {
         self.georeference.lonlat_from_crs(self.georeference.middle()).ok()
+    }
+
+    /// A picture as it lies over land of this frame, and what was noticed.
+    pub fn drape(&self, file: &Path, land: &Land) -> Result<(Drape, Vec<String>), Error> {
+        littoral_data::open_drape(file, land, &self.georeference, self.crs_from_local)
     }
 
     /// The angle from the land's y axis clockwise to true north (rad).

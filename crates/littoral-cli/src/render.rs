@@ -10,9 +10,9 @@ use crate::sun::SunChoice;
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
 use crate::waves::state as sea;
 use clap::ValueEnum;
-use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
+use glam::{DVec3, UVec2};
 use littoral::field::{Sea, coast};
-use littoral::picture::{self, Border, Climate, Display, Drape, Picture, Scene, Settings, Shot, Stage, Texture};
+use littoral::picture::{self, Border, Climate, Display, Picture, Scene, Settings, Shot, Stage};
 use littoral::space::{Ray, View};
 use littoral::waves::SeaState;
 use littoral_data::ObjectOrder;
@@ -98,7 +98,7 @@ pub struct Render {
     #[arg(long, value_name = "METRES|none", value_parser = input::water, default_value = "0", help_heading = "Look")]
     water: WaterLevel,
     /// The waves on the sea: wind=15,from=240 (m/s, and where it blows from), hs=2,tp=9 (height and period), beaufort=6, douglas=4 or calm;
-    /// buoy=FILE (an NDBC spectrum); more with fetch=KM, swell=HEIGHT@PERIOD/FROM, model=, gamma=, spread=, depth=, seed=
+    /// buoy=FILE (an NDBC spectrum); more with fetch=KM, swell=HEIGHT@PERIOD/FROM, model=, gamma=, spread=, depth=, breaking=, seed=
     /// [default: calm; the built-in coast: beaufort=4,from=225]
     #[arg(long, value_name = "SPEC", help_heading = "Look")]
     sea: Option<String>,
@@ -229,7 +229,7 @@ impl Render {
             shot.shot.border = film.border(&subject)?;
             shot.shot.air.veils_distance = shot.border == Border::Mist || self.visibility.is_some();
         }
-        let drape = self.texture.as_ref().map(|texture| drape(texture, &subject, talk)).transpose()?;
+        let drape = self.texture.as_ref().map(|texture| subject.drape(texture, talk)).transpose()?;
         let objects = objects::standing(&self.object, System::of(self.lonlat), &subject, talk)?;
         if shot.style == picture::Style::Relief && !objects.is_empty() {
             talk.warn("a shaded relief is a map: objects are not shown on it".to_owned());
@@ -575,52 +575,6 @@ fn climate(frame: &Frame) -> Climate {
         Some(latitude) => Climate::at_latitude(latitude.to_radians()),
         None => Climate::default(),
     }
-}
-
-/// A picture to lay over the ground.
-fn drape(file: &Path, subject: &Subject, talk: &mut Talk) -> Result<Drape, Failure> {
-    let image = littoral_data::open_image(file)?;
-    for warning in &image.warnings {
-        talk.warn(format!("{}: {warning}", file.display()));
-    }
-    let (land, frame) = (&subject.land, &subject.frame);
-    let size = DVec2::new(image.columns as f64, image.rows as f64);
-    let texture = Texture::from_srgb(UVec2::new(image.columns as u32, image.rows as u32), &image.rgb);
-    // All of the land, its south-western corner at the picture's lower left one.
-    let everywhere = DAffine2::from_scale(DVec2::new(1.0, -1.0) / land.extent())
-        * DAffine2::from_translation(-(land.origin() + DVec2::Y * land.extent().y));
-    let Some(place) = &image.georeference else {
-        talk.warn(format!("{}: the picture says not where it lies: laid over all of the land", file.display()));
-        return Ok(Drape { texture, uv_from_local: everywhere });
-    };
-    let uv_from_crs = DAffine2::from_scale(1.0 / size)
-        * DAffine2::from_translation(DVec2::splat(0.5))
-        * place.crs_from_sample().inverse();
-    // From the land's metres to the picture's coordinates: exact at three corners of the land, an affine map between.
-    let corner = |share: DVec2| -> Result<DVec2, String> {
-        let crs = frame.crs(land.origin() + share * land.extent());
-        let same = place.crs == frame.system() || place.crs == littoral_data::Crs::Unknown;
-        let there = if same { crs } else { place.crs_from_lonlat(frame.lonlat(crs)?)? };
-        Ok(uv_from_crs.transform_point2(place.near(there)))
-    };
-    let corners = (|| Ok([corner(DVec2::ZERO)?, corner(DVec2::X)?, corner(DVec2::Y)?]))();
-    let [origin, east, north] = corners.map_err(|e: String| {
-        Failure::Work(format!("{}: {e}; convert the picture to the land's system", file.display()))
-    })?;
-    let uv_from_unit = DAffine2::from_mat2_translation(DMat2::from_cols(east - origin, north - origin), origin);
-    let unit_from_local = DAffine2::from_scale(1.0 / land.extent()) * DAffine2::from_translation(-land.origin());
-    let uv_from_local = uv_from_unit * unit_from_local;
-    let shares = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(|share| uv_from_unit.transform_point2(share));
-    let (low, high) = (shares.into_iter().fold(shares[0], DVec2::min), shares.into_iter().fold(shares[0], DVec2::max));
-    if high.min_element() < 0.0 || low.max_element() > 1.0 {
-        let name = &subject.name;
-        let problem = format!("expected a picture that lies over {name}, got one of another place; name another");
-        return Err(Failure::Work(format!("{}: {problem}", file.display())));
-    }
-    if low.min_element() < -0.01 || high.max_element() > 1.01 {
-        talk.warn(format!("{}: the picture covers only a part of the land", file.display()));
-    }
-    Ok(Drape { texture, uv_from_local })
 }
 
 /// Complains about an output before any work is done: a missing folder, or one of the inputs.

@@ -5,8 +5,9 @@ use crate::input::WaterLevel;
 use crate::talk::{Failure, Talk, progress, tidy};
 use glam::{DVec2, DVec3};
 use littoral::field::{Lakes, Land, Sea, Water, coast};
+use littoral::picture::Drape;
 use littoral::waves::{SeaState, ShoreError};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Land and all that belongs to it.
 pub struct Subject {
@@ -83,6 +84,13 @@ impl Subject {
         let mut sea = made.map_err(failure)?;
         sea.set_time(seconds);
         Ok(Some(sea))
+    }
+
+    /// A picture to lay over the ground.
+    pub fn drape(&self, file: &Path, talk: &mut Talk) -> Result<Drape, Failure> {
+        let (drape, warnings) = self.frame.drape(file, &self.land)?;
+        warnings.into_iter().for_each(|warning| talk.warn(format!("{}: {warning}", file.display())));
+        Ok(drape)
     }
 
     /// Local metres of typed coordinates.

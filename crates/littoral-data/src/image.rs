@@ -4,7 +4,7 @@
 
 use crate::formats::{Input, tiff};
 use crate::{Error, Georeference, Info};
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::path::Path;
 
 /// A picture in sRGB, row by row from its first row.
@@ -37,6 +37,22 @@ const MOST_PIXELS_A_BYTE: u64 = 344;
 /// If it cannot be read, is of no known format or broken, or is larger than its file can hold or memory should.
 pub fn open_image(file: &Path) -> Result<Image, Error> {
     image_from(Input::file(file)?)
+}
+
+/// Whether a file is a picture of something and no heights: colours that code none, of eight bits, or a JPEG of any kind.
+pub fn is_picture(file: &Path) -> bool {
+    let Ok(mut input) = Input::file(file) else { return false };
+    let Some(format) = input.head(16).ok().and_then(|head| image::guess_format(&head).ok()) else { return false };
+    let coloured = |input: &mut Input| {
+        let reader = ImageReader::with_format(input.from_start().ok()?, format);
+        Some(matches!(reader.into_decoder().ok()?.color_type(), ColorType::Rgb8 | ColorType::Rgba8))
+    };
+    match format {
+        ImageFormat::Jpeg => true,
+        ImageFormat::Bmp | ImageFormat::Tiff => coloured(&mut input) == Some(true),
+        ImageFormat::Png => coloured(&mut input) == Some(true) && crate::open(file).is_err(),
+        _ => false,
+    }
 }
 
 /// Decodes an opened picture.
@@ -165,6 +181,31 @@ mod tests {
         let georeference = picture.georeference.expect("placed");
         assert_eq!(georeference.geotransform, [100.0, 2.0, 0.0, 1000.0, 0.0, -2.0]);
         assert_eq!(georeference.size, [16, 8]);
+    }
+
+    #[test]
+    fn pictures_are_told_from_heights() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let told = |name: &str, bytes: &[u8]| {
+            let file = folder.path().join(name);
+            std::fs::write(&file, bytes).expect("written");
+            is_picture(&file)
+        };
+        let noise = |count: u32| (0..count).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect::<Vec<_>>();
+        assert!(told("photo.png", &png(&noise(32 * 32 * 3), 32, 32, ExtendedColorType::Rgb8)));
+        // Terrarium: 256 R + G + B / 256 − 32768.
+        let hill = |i: u32| [128, (i % 32 + i / 32) as u8, 0];
+        let terrarium: Vec<u8> = (0..32 * 32).flat_map(hill).collect();
+        assert!(!told("tile.png", &png(&terrarium, 32, 32, ExtendedColorType::Rgb8)));
+        assert!(!told("grey.png", &png(&noise(64), 8, 8, ExtendedColorType::L8)));
+        let mut jpeg = Vec::new();
+        JpegEncoder::new(&mut jpeg).write_image(&[7; 64], 8, 8, ExtendedColorType::L8).expect("encodes");
+        assert!(told("photo.dat", &jpeg));
+        let mut tiff = std::io::Cursor::new(Vec::new());
+        let encoder = image::codecs::tiff::TiffEncoder::new(&mut tiff);
+        encoder.write_image(&noise(8 * 8 * 3), 8, 8, ExtendedColorType::Rgb8).expect("encodes");
+        assert!(told("ortho.tif", tiff.get_ref()));
+        assert!(!told("dem.asc", b"ncols 2\n") && !told("empty", b"") && !is_picture(Path::new("not there")));
     }
 
     #[test]

@@ -29,6 +29,7 @@
 
 mod bytes;
 mod crs;
+mod drape;
 mod error;
 pub mod formats;
 mod georeference;
@@ -46,8 +47,9 @@ pub mod waves;
 mod wkt;
 pub mod write;
 
-pub use crate::image::{BEHIND, Image, image_from, open_image};
+pub use crate::image::{BEHIND, Image, image_from, is_picture, open_image};
 pub use crs::{Crs, metres_of_unit_name, name_of_unit};
+pub use drape::open_drape;
 pub use error::Error;
 pub use formats::tiles::{Code, Encoding};
 pub use georeference::{Georeference, Registration, metres_per_degree};

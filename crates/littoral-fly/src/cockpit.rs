@@ -3,16 +3,18 @@
 use crate::calendar;
 use crate::camera::{Camera, Hands, Mode, World};
 use crate::compare::Difference;
+use crate::detail::Detail;
 use crate::draw::Scenery;
 use crate::editor::Editor;
 use crate::scene::{Frame, Look, News, Wish};
-use crate::settings::{Detail, Settings, Split, Style, SunBy};
+use crate::seastate::Surf;
+use crate::settings::{Laid, Settings, Split, Style, SunBy};
 use crate::steering::Steering;
-use crate::subject::{Order, Subject};
+use crate::subject::{Order, Refusal, Subject};
 use crate::tape::Tape;
 use glam::{DVec2, DVec3, UVec2, Vec2};
 use littoral::flight::{FlightPath, Pace};
-use littoral::picture::{Shot, Sun};
+use littoral::picture::{self, Shot, Sun};
 use littoral::space::View;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -38,9 +40,16 @@ pub struct History {
     pub triangles: VecDeque<f32>,
     /// The bound that was reached on the ground (pixels).
     pub bound: VecDeque<f32>,
+    /// What frames brought to the graphics card of meshes (MB).
+    pub uploads: VecDeque<f32>,
 }
 
 impl History {
+    /// Adds what a frame brought to the graphics card (bytes).
+    pub fn uploaded(&mut self, bytes: u64) {
+        History::push(&mut self.uploads, bytes as f64 * 1e-6);
+    }
+
     fn push(list: &mut VecDeque<f32>, value: f64) {
         if list.len() == HISTORY {
             list.pop_front();
@@ -116,6 +125,10 @@ pub struct Cockpit {
     pub steering: Option<Steering>,
     /// What the sea's state is while it is typed.
     pub sea_text: String,
+    /// Where the waves break, if they do.
+    pub surf: Option<Surf>,
+    /// The name of the picture of the ground while it is typed.
+    pub picture_text: String,
     /// Logarithm of the radiance that is shown as middle grey.
     grey: Option<f32>,
     clock: f64,
@@ -129,6 +142,8 @@ impl Cockpit {
         Cockpit {
             order: Order { files, exaggeration: settings.exaggeration, objects: Vec::new() },
             sea_text: settings.sea.clone(),
+            surf: None,
+            picture_text: settings.laid.as_ref().map_or(String::new(), |laid| laid.picture.display().to_string()),
             settings,
             subject: None,
             serial: 0,
@@ -171,15 +186,39 @@ impl Cockpit {
             News::Working(what, done) => self.working = Some((what, done)),
             News::Idle => self.working = None,
             News::Note(text) => self.note(text),
-            News::Refused(problem) => {
-                self.note(problem);
+            News::Refused(refusal) => {
+                let laid = match (refusal, &self.subject) {
+                    (Refusal::Problem(problem), _) => {
+                        self.note(problem);
+                        None
+                    }
+                    (Refusal::Picture(picture), None) => {
+                        let file = picture.display();
+                        self.note(format!(
+                            "{file}: expected heights, got a picture; open a land, then drop it on that"
+                        ));
+                        None
+                    }
+                    (Refusal::Picture(picture), Some(_)) => Some(picture),
+                };
                 // What was there is flown on; where nothing was, the built-in coast.
                 self.order = match &self.subject {
                     Some(subject) => subject.order.clone(),
                     None => Order { files: Vec::new(), exaggeration: 1.0, objects: Vec::new() },
                 };
                 self.settings.exaggeration = self.order.exaggeration;
+                if let Some(picture) = laid {
+                    self.lay(&picture);
+                }
             }
+            News::Undraped(problem) => {
+                self.note(problem);
+                self.settings.laid = None;
+                if self.settings.style == Style::Image {
+                    self.settings.style = Style::Natural;
+                }
+            }
+            News::Surf(surf) => self.surf = surf,
             News::Arrived(subject, shot, serial) => self.arrive(subject, *shot, serial),
             News::Scenery(scenery, serial) => {
                 if serial == self.serial {
@@ -193,7 +232,7 @@ impl Cockpit {
                     }
                     History::push(&mut self.history.method, frame.first.milliseconds);
                     History::push(&mut self.history.triangles, frame.first.triangles() as f64);
-                    History::push(&mut self.history.bound, f64::from(frame.first.ground_reached.pixels));
+                    History::push(&mut self.history.bound, f64::from(frame.first.ground.reached.pixels));
                     self.frame = Some(*frame);
                 }
             }
@@ -207,7 +246,7 @@ impl Cockpit {
         });
         subject.notes.clone().into_iter().for_each(|note| self.note(note));
         (self.serial, self.scenery, self.frame, self.frozen, self.grey) = (serial, None, None, None, None);
-        (self.taped, self.tape, self.playing) = (None, None, None);
+        (self.taped, self.tape, self.playing, self.surf) = (None, None, None, None);
         self.subject = Some(subject);
         match stretch {
             // The same land, stretched: whoever flies stays where he is.
@@ -307,9 +346,9 @@ impl Cockpit {
         }
     }
 
-    /// Whether waves are wanted as triangles: natural pictures make them of the sea itself.
+    /// Whether waves are wanted as triangles: lit pictures make them of the sea itself.
     fn shows_waves(&self) -> bool {
-        self.settings.style == Style::Plain
+        self.settings.style == Style::Plain || self.scenery.as_ref().is_some_and(Scenery::is_plain)
     }
 
     /// The instant of the sea that is wished for (s): still water has but one.
@@ -317,13 +356,34 @@ impl Cockpit {
         if self.settings.waves { self.time } else { 0.0 }
     }
 
+    /// The picture that is laid over this land.
+    pub fn picture(&self) -> Option<&Path> {
+        let laid = self.settings.laid.as_ref()?;
+        (*laid == Laid::new(&laid.picture, &self.order.files)).then_some(&laid.picture)
+    }
+
+    /// Lays a picture over this land.
+    pub fn lay(&mut self, picture: &Path) {
+        self.picture_text = picture.display().to_string();
+        self.settings.laid = Some(Laid::new(picture, &self.order.files));
+        self.settings.style = Style::Image;
+    }
+
+    /// In which light the land is seen.
+    fn look(&self) -> Look {
+        let settings = &self.settings;
+        let visibility = (settings.visibility_kilometres > 0.0).then_some(settings.visibility_kilometres * 1000.0);
+        let picture = self.picture().filter(|_| settings.style == Style::Image).map(Path::to_owned);
+        let style = settings.style.lit().filter(|style| *style != picture::Style::Image || picture.is_some());
+        Look { sun: self.sun(), visibility, style: style.unwrap_or_default(), picture }
+    }
+
     /// What is wished for, in a picture of this size.
     pub fn wish(&self, size: UVec2) -> Wish {
         let settings = &self.settings;
-        let visibility = (settings.visibility_kilometres > 0.0).then_some(settings.visibility_kilometres * 1000.0);
         Wish {
             order: self.order.clone(),
-            look: Look { sun: self.sun(), visibility },
+            look: self.look(),
             sea: settings.waves.then(|| settings.sea.clone()),
             first: self.first(),
             second: self.second(),
@@ -511,5 +571,31 @@ impl Cockpit {
         // They stood on the land before.
         self.order.objects.clear();
         self.working = Some(("opening".to_owned(), 0.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_laid_over_the_land_that_it_was_dropped_on_alone() {
+        let mut cockpit = Cockpit::new(Settings::default(), vec!["dem.tif".into()]);
+        cockpit.lay(Path::new("ortho.tif"));
+        let style = |cockpit: &Cockpit| cockpit.wish(UVec2::new(16, 9)).look.style;
+        assert!(cockpit.picture().is_some_and(|picture| picture.is_absolute() && picture.ends_with("ortho.tif")));
+        assert_eq!(style(&cockpit), picture::Style::Image);
+        let settings = cockpit.settings.clone();
+        let again = Cockpit::new(settings.clone(), vec!["./dem.tif".into()]);
+        assert_eq!(style(&again), picture::Style::Image, "remembered");
+        let elsewhere = Cockpit::new(settings, Vec::new());
+        assert_eq!((elsewhere.picture(), style(&elsewhere)), (None, picture::Style::Natural));
+        // What cannot be laid is forgotten.
+        cockpit.hear(News::Undraped("broken".into()));
+        assert_eq!((cockpit.settings.laid.as_ref(), cockpit.settings.style), (None, Style::Natural));
+        assert_eq!(cockpit.notes[0].text, "broken");
+        // Colours dropped before there is a land are no picture of it.
+        cockpit.hear(News::Refused(Refusal::Picture("photo.jpg".into())));
+        assert!(cockpit.settings.laid.is_none() && cockpit.notes[1].text.contains("photo.jpg: expected heights"));
     }
 }

@@ -7,6 +7,7 @@ use crate::scene::{Choice, Frame};
 use crate::settings::{Settings, Show, Split, Style};
 use glam::{Mat4, UVec2, Vec2};
 use littoral::field::{HeightField, Sea};
+use littoral::lod::Mesh;
 use littoral::picture::{Placed, Stage};
 use littoral::space::{Datum, View};
 use littoral_gpu::{Gpu, Ground, Look, ShapeTexture, Triangles, Waves};
@@ -41,6 +42,11 @@ impl Scenery {
         };
         let plain = Arc::new(plain::Scenery::new(stage));
         (Scenery { full, plain, shape: Arc::default(), changes: Arc::default() }, problem)
+    }
+
+    /// Whether it can only be drawn plainly.
+    pub fn is_plain(&self) -> bool {
+        self.full.is_none()
     }
 
     /// Which scenery it is, and in which state.
@@ -122,8 +128,9 @@ impl Seen<'_> {
     /// One pixel of light for so many of the window's, each way. Edges are drawn by the window's own.
     fn coarse(&self) -> u32 {
         match (self.settings.style, self.settings.show) {
-            (Style::Natural, Show::Textured) => self.settings.coarse.max(1),
-            _ => 1,
+            (Style::Plain, _) | (_, Show::Wireframe | Show::Both) => 1,
+            _ if self.scenery.is_plain() => 1,
+            _ => self.settings.coarse.max(1),
         }
     }
 
@@ -186,6 +193,8 @@ pub struct Renderer {
     compare: Compare,
     gatherer: Gatherer,
     rest: Rest,
+    /// Bytes of meshes brought to the device since [`Renderer::take_uploads`].
+    uploads: u64,
 }
 
 impl Renderer {
@@ -199,7 +208,13 @@ impl Renderer {
             compare: Compare::new(gpu, format),
             gatherer: Gatherer::new(gpu, format),
             rest: Rest::default(),
+            uploads: 0,
         }
+    }
+
+    /// Bytes of meshes that were brought to the device since this was asked last.
+    pub fn take_uploads(&mut self) -> u64 {
+        std::mem::take(&mut self.uploads)
     }
 
     /// How far apart the two pictures were that were shown last.
@@ -243,14 +258,15 @@ impl Renderer {
     /// Brings the grounds of a frame to the device.
     fn hold(&mut self, gpu: &Gpu, seen: &Seen) {
         let frame = Some((seen.frame.serial, seen.frame.number));
-        if self.holds == frame || seen.settings.style != Style::Natural {
+        if self.holds == frame || seen.settings.style == Style::Plain {
             return;
         }
         let choices = std::iter::once(&seen.frame.first).chain(&seen.frame.second);
         for (ground, choice) in self.grounds.iter_mut().zip(choices) {
             // No budget of the panel's is too large for what WebGPU promises of buffers; if one were, the triangles before stay.
-            if let Err(problem) = ground.set(gpu, &choice.ground) {
-                eprintln!("littoral-fly: {problem}");
+            match ground.set(gpu, &choice.ground.mesh) {
+                Ok(()) => self.uploads += bytes(&choice.ground.mesh),
+                Err(problem) => eprintln!("littoral-fly: {problem}"),
             }
         }
         self.holds = frame;
@@ -303,10 +319,11 @@ impl Renderer {
     ) {
         let settings = seen.settings;
         let (surface, wireframe) = (settings.show != Show::Wireframe, settings.show != Show::Textured);
-        let full = seen.scenery.full.as_ref().filter(|_| settings.style == Style::Natural);
+        let full = seen.scenery.full.as_ref().filter(|_| settings.style != Style::Plain);
         let Some(full) = full else {
-            let (ground, water) = (&choice.ground, choice.water.as_ref());
+            let (ground, water) = (&choice.ground.mesh, choice.water.as_ref().map(|water| &water.mesh));
             let drawn = plain::Frame { view: &moved(view, look), ground, water, surface, wireframe };
+            self.uploads += bytes(ground) + water.map_or(0, bytes);
             return self.plain.draw(gpu, &seen.scenery.plain, &drawn, target);
         };
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -327,6 +344,11 @@ impl Renderer {
         }
         gpu.queue.submit([encoder.finish()]);
     }
+}
+
+/// How large a mesh is.
+fn bytes(mesh: &Mesh) -> u64 {
+    (size_of_val(&mesh.vertices[..]) + size_of_val(&mesh.triangles[..])) as u64
 }
 
 /// A view through another part of each pixel.

@@ -63,7 +63,7 @@ impl Filming {
             return Err("the window changed its size: the film ends here".into());
         }
         let wanted = (cockpit.lod_view(size), cockpit.sea_time(), cockpit.second().is_some());
-        let come = |f: &Frame| (f.view, f.time, f.second.is_some()) == wanted;
+        let come = |f: &Frame| (f.view, f.time, f.second.is_some()) == wanted && !f.is_unfinished();
         Ok(cockpit.scenery.is_some() && cockpit.frame.as_ref().is_some_and(come))
     }
 

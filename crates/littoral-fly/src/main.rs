@@ -9,6 +9,8 @@ mod camera;
 mod chooser;
 mod cockpit;
 mod compare;
+mod detail;
+mod draping;
 mod draw;
 mod editor;
 mod film;
@@ -30,17 +32,18 @@ mod window;
 
 use camera::Mode;
 use clap::Parser;
+use detail::Detail;
 use glam::UVec2;
 use littoral::lod::Method;
 use littoral_data::ObjectOrder;
-use settings::{Detail, Settings, Show, Split, Style};
+use settings::{Laid, Settings, Show, Split, Style};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Fly over any land and its sea, walk on it, sail on it, and change how it is drawn while you look.
 ///
-/// Without FILE the built-in coast is opened. Files can also be dropped on the window: height files become the land, a path's file (.toml) is
-/// loaded. Settings are remembered from flight to flight.
+/// Without FILE the built-in coast is opened. Files can also be dropped on the window: height files become the land, a picture is laid over the ground, a path's
+/// file (.toml) is loaded. Settings are remembered from flight to flight.
 #[derive(Parser)]
 #[command(
     name = "littoral-fly",
@@ -55,6 +58,7 @@ use std::process::ExitCode;
   littoral-fly --method strips --against whole two methods, and how far apart their pictures are
   littoral-fly --sea beaufort=8,from=240 --mode boat
   littoral-fly --object lighthouse@3030,1310   with a lighthouse on the rock
+  littoral-fly dem.tif --texture ortho.tif     under a picture of the ground
   littoral-fly --smoke 200 --size 1280x720     fly 200 frames, print the medians as JSON
 
 In the window: W S A D and the mouse fly, the wheel sets the speed, F1 lists all keys. F12 saves
@@ -93,9 +97,12 @@ struct Arguments {
     /// The exact ground by rays in place of the method's mesh, in natural pictures
     #[arg(long)]
     rays: bool,
-    /// How the picture is drawn: in the light of the data, or as the triangles themselves
-    #[arg(long, value_parser = named::<Style>, value_name = "natural|plain")]
+    /// How the picture is drawn: in the light of the data, or (plain) as the triangles themselves
+    #[arg(long, value_parser = named::<Style>, value_name = "natural|tint|relief|image|plain")]
     style: Option<Style>,
+    /// A picture to lay over the ground (.tif, .png, .jpg); where it has no place of its own, over all of it
+    #[arg(long, value_name = "IMAGE")]
+    texture: Option<PathBuf>,
     /// One pixel of light for so many of the window's, each way: natural pictures without a graphics card [default: 1; 4 without a graphics card]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8))]
     coarse: Option<u32>,
@@ -164,6 +171,9 @@ impl Arguments {
         }
         // A second method stays a mesh: so the two show how wrong it is.
         settings.first.rays |= self.rays;
+        if let Some(picture) = &self.texture {
+            (settings.laid, settings.style) = (Some(Laid::new(picture, &self.files)), Style::Image);
+        }
         settings.style = self.style.unwrap_or(settings.style);
         settings.coarse = self.coarse.unwrap_or(settings.coarse);
         settings.show = self.show.unwrap_or(settings.show);

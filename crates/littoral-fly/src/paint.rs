@@ -114,6 +114,11 @@ impl Paint {
         self.renderer.difference()
     }
 
+    /// Bytes of meshes that were brought to the device since this was asked last.
+    pub fn take_uploads(&mut self) -> u64 {
+        self.renderer.take_uploads()
+    }
+
     /// Takes what changed of egui's textures: once for each run of it, painted or not.
     pub fn take_textures(&mut self, gui: &mut Gui) {
         for (id, deltas) in &gui.textures.set {

@@ -9,6 +9,7 @@ pub fn show(ui: &mut Ui, history: &History) {
     plot(ui, "frame", " ms", &history.frame, Color32::from_rgb(120, 200, 255));
     plot(ui, "method", " ms", &history.method, Color32::from_rgb(160, 230, 140));
     plot(ui, "triangles", "", &history.triangles, Color32::from_rgb(255, 200, 110));
+    plot(ui, "uploads", " MB", &history.uploads, Color32::from_rgb(210, 170, 255));
     plot(ui, "bound", " px", &history.bound, Color32::from_rgb(255, 140, 140));
 }
 
@@ -38,7 +39,8 @@ fn plot(ui: &mut Ui, name: &str, unit: &str, values: &VecDeque<f32>, colour: Col
     painter.rect_filled(rect, 2.0, Color32::from_black_alpha(90));
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     // One stall shall not flatten all the rest.
-    let top = round_above(finite().fold(0.0, f32::max).min(8.0 * median(finite()).max(1e-6)));
+    let (most, usual) = (finite().fold(0.0, f32::max), median(finite()));
+    let top = round_above(if usual > 0.0 { most.min(8.0 * usual) } else { most });
     let step = rect.width() / (values.len().max(2) - 1) as f32;
     let points: Vec<egui::Pos2> = values
         .iter()

@@ -5,31 +5,36 @@
 //!
 //! Everything that borrows the land (the stage, the sea's method, ROAM's bounds) lives on the stack of [`fly`], for as long as that land is flown over.
 
-use crate::chooser::Chooser;
+use crate::chooser::{Chooser, Chosen, Limit, Prepared};
+use crate::detail::Detail;
+use crate::draping::Draping;
 use crate::draw::Scenery;
 use crate::plain::sea_datum;
-use crate::settings::Detail;
-use crate::subject::{Order, Subject};
+use crate::seastate::Surf;
+use crate::subject::{Order, Refusal, Subject};
 use glam::{DVec2, UVec2};
 use littoral::field::Sea;
-use littoral::lod::{Mesh, NestedBounds, Reached, ViewError};
-use littoral::picture::{self, Air, Border, Climate, Scene, Shot, Stage, Sun};
+use littoral::lod::ViewError;
+use littoral::picture::{self, Air, Border, Climate, Drape, Scene, Shot, Stage, Style, Sun};
 use littoral::space::View;
 use littoral::waves::SeaState;
 use littoral_gpu::Gpu;
-use std::cell::OnceCell;
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::path::PathBuf;
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// What decides the light and the colours: each change makes the stage anew.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Look {
     /// The sun; `None` for one that suits the land.
     pub sun: Option<Sun>,
     /// How far one sees (m); `None` for what suits the land.
     pub visibility: Option<f64>,
+    /// How the ground is coloured.
+    pub style: Style,
+    /// The picture that is laid over it, if one is.
+    pub picture: Option<PathBuf>,
 }
 
 /// What the window wishes to see.
@@ -63,13 +68,9 @@ pub struct Choice {
     /// How.
     pub detail: Detail,
     /// The ground.
-    pub ground: Mesh,
+    pub ground: Chosen,
     /// The water.
-    pub water: Option<Mesh>,
-    /// How well the ground is drawn.
-    pub ground_reached: Reached,
-    /// How well the water is drawn.
-    pub water_reached: Option<Reached>,
+    pub water: Option<Chosen>,
     /// How long the choice took (ms).
     pub milliseconds: f64,
 }
@@ -77,7 +78,7 @@ pub struct Choice {
 impl Choice {
     /// Triangles of ground and water.
     pub fn triangles(&self) -> usize {
-        self.ground.triangles.len() + self.water.as_ref().map_or(0, |water| water.triangles.len())
+        self.ground.mesh.triangles.len() + self.water.as_ref().map_or(0, |water| water.mesh.triangles.len())
     }
 }
 
@@ -102,6 +103,14 @@ pub struct Frame {
     pub heights: Option<[f64; 4]>,
 }
 
+impl Frame {
+    /// Whether its meshes would be others had there been more time.
+    pub fn is_unfinished(&self) -> bool {
+        let choices = [Some(&self.first), self.second.as_ref()];
+        choices.into_iter().flatten().any(|choice| choice.ground.limit == Some(Limit::Time))
+    }
+}
+
 /// What the scene tells the window.
 pub enum News {
     /// Something is being done, and this much of it is done, in [0, 1].
@@ -111,7 +120,11 @@ pub enum News {
     /// Something that shall be read.
     Note(String),
     /// What was ordered could not be opened.
-    Refused(String),
+    Refused(Refusal),
+    /// A picture could not be laid over the land.
+    Undraped(String),
+    /// The surf of the waves that are seen now.
+    Surf(Option<Surf>),
     /// Another land, and a good view of it.
     Arrived(Arc<Subject>, Box<Shot>, u64),
     /// The light and the colours of a land.
@@ -157,13 +170,14 @@ struct Ended;
 pub struct Voice {
     news: Sender<News>,
     wake: Arc<dyn Fn() + Send + Sync>,
-    told: Arc<AtomicI32>,
+    /// What was said last to be done, and how much of it (%).
+    told: Arc<Mutex<(String, i32)>>,
 }
 
 impl Voice {
     /// News go to the window, which is woken for them.
     pub fn new(news: Sender<News>, wake: impl Fn() + Send + Sync + 'static) -> Voice {
-        Voice { news, wake: Arc::new(wake), told: Arc::new(AtomicI32::new(-1)) }
+        Voice { news, wake: Arc::new(wake), told: Arc::default() }
     }
 
     fn tell(&self, news: News) {
@@ -174,13 +188,16 @@ impl Voice {
     /// Each percent once.
     fn working(&self, what: &str, done: f32) {
         let percent = (done.clamp(0.0, 1.0) * 100.0) as i32;
-        if self.told.swap(percent, Ordering::Relaxed) != percent {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if (told.0.as_str(), told.1) != (what, percent) {
+            *told = (what.to_owned(), percent);
+            drop(told);
             self.tell(News::Working(what.to_owned(), done));
         }
     }
 
     fn idle(&self) {
-        self.told.store(-1, Ordering::Relaxed);
+        self.told.lock().unwrap_or_else(PoisonError::into_inner).0.clear();
         self.tell(News::Idle);
     }
 }
@@ -240,7 +257,7 @@ pub fn run(slot: &Slot, voice: &Voice, gpu: &Gpu) {
 /// A land that is being opened.
 struct Opening {
     order: Order,
-    thread: Option<std::thread::JoinHandle<Result<Subject, String>>>,
+    thread: Option<std::thread::JoinHandle<Result<Subject, Refusal>>>,
 }
 
 impl Opening {
@@ -261,18 +278,18 @@ impl Opening {
     }
 
     /// What was opened, once.
-    fn take(&mut self) -> Option<Result<Subject, String>> {
+    fn take(&mut self) -> Option<Result<Subject, Refusal>> {
         let thread = self.thread.take_if(|thread| thread.is_finished())?;
         let name = littoral_data::name_of_all(&self.order.files);
         let broken = || format!("{}: could not be opened (an internal error; please report it)", name.display());
-        Some(thread.join().unwrap_or_else(|_| Err(broken())))
+        Some(thread.join().unwrap_or_else(|_| Err(Refusal::Problem(broken()))))
     }
 }
 
 /// Flies over a land until another one is open. `suits` is a view with the light that suits it.
 #[allow(clippy::too_many_arguments, reason = "what is flown over, what is wished for, and whom to tell")]
 fn fly(
-    subject: &Subject,
+    subject: &Arc<Subject>,
     suits: &Shot,
     serial: u64,
     wish: &mut Wish,
@@ -280,16 +297,22 @@ fn fly(
     slot: &Slot,
     voice: &Voice,
     gpu: &Gpu,
-) -> Result<Result<Subject, String>, Ended> {
+) -> Result<Result<Subject, Refusal>, Ended> {
     std::thread::scope(|threads| {
         let mut waves: Option<Sea> = None;
         // What the waves are of, and what is being made.
         let mut state: Option<String> = None;
         let mut number = 0;
-        let mut making: Option<std::thread::ScopedJoinHandle<'_, Result<Sea, String>>> = None;
+        let mut making: Option<std::thread::ScopedJoinHandle<'_, Result<Made, String>>> = None;
+        let mut draping = Draping::default();
+        let mut drape: Option<Arc<Drape>> = None;
         loop {
-            let look = wish.look;
-            let scene = scene(subject, suits, &look);
+            let (mut look, laid) = (wish.look.clone(), drape.clone());
+            if laid.is_none() && look.picture.take().is_some() {
+                look.style = Style::Natural; // until it is open
+            }
+            let scene = scene(subject, suits, &look, laid.as_deref());
+            let visibility = scene.air.visibility;
             voice.working("lighting the land", 0.0);
             let stage = Stage::new(&scene);
             let (scenery, problem) = Scenery::new(gpu, &stage, wish.eye.eye.z);
@@ -298,12 +321,12 @@ fn fly(
             }
             voice.tell(News::Scenery(scenery.clone(), serial));
             voice.idle();
-            let bounds: OnceCell<Option<NestedBounds>> = OnceCell::new();
+            let prepared = Prepared::default();
             let mut meter = Meter::default();
             // How long the last sky took, and when it was done.
             let mut sky = (Duration::ZERO, Instant::now());
             let mut still = subject.water.as_ref().map(|water| Sea::new(sea_datum(&subject.land), water.level));
-            let mut first = Chooser::new(stage.land(), &bounds, wish.first);
+            let mut first = Chooser::new(stage.land(), &prepared, wish.first);
             let mut second: Option<Chooser> = None;
             let mut answered: Option<Wish> = None;
             // Which waves natural pictures show: whether any, and of which instant (s).
@@ -311,16 +334,31 @@ fn fly(
             // With which sea objects were placed: whether there was any, and its instant (s).
             let mut placed: Option<(bool, f64)> = None;
             loop {
-                if wish.look != look {
+                if draping.follow(wish.look.picture.as_deref(), subject) {
+                    voice.working("opening the picture", 0.0);
+                }
+                match draping.ended() {
+                    Some(Ok(noticed)) => noticed.into_iter().for_each(|words| voice.tell(News::Note(words))),
+                    Some(Err(problem)) => {
+                        voice.idle();
+                        voice.tell(News::Undraped(problem));
+                    }
+                    None => {}
+                }
+                // Until a picture is open, the ground is seen as it was.
+                let open = draping.drape(wish.look.picture.as_deref());
+                if wish.look != look && (wish.look.picture.is_none() || open.is_some()) {
+                    drape = open.cloned();
                     break;
                 }
                 opening.follow(&wish.order, Some(&subject.order), voice);
-                if let Some(done) = opening.take() {
-                    if done.is_ok() {
-                        return Ok(done);
+                match opening.take() {
+                    Some(Ok(opened)) => return Ok(Ok(opened)),
+                    Some(Err(refusal)) => {
+                        voice.idle();
+                        voice.tell(News::Refused(refusal));
                     }
-                    voice.idle();
-                    voice.tell(News::Refused(done.err().unwrap_or_default()));
+                    None => {}
                 }
                 if making.is_none() && wish.sea != state {
                     state.clone_from(&wish.sea);
@@ -333,7 +371,10 @@ fn fly(
                 if let Some(made) = making.take_if(|making| making.is_finished()) {
                     voice.idle();
                     match made.join() {
-                        Ok(Ok(sea)) => waves = Some(sea),
+                        Ok(Ok((sea, surf))) => {
+                            waves = Some(sea);
+                            voice.tell(News::Surf(surf));
+                        }
                         Ok(Err(problem)) => voice.tell(News::Note(problem)),
                         Err(_) => voice.tell(News::Note(
                             "the waves could not be made (an internal error; please report it)".into(),
@@ -354,17 +395,27 @@ fn fly(
                 }
                 // A view that rests is metered once more, where the last measurement was of another one.
                 if answered.as_ref() != Some(&*wish) || meter.wants(&wish.eye) {
+                    let ready =
+                        [Some(&wish.first), wish.second.as_ref()].into_iter().flatten().all(|d| prepared.is_for(d));
+                    if !ready {
+                        voice.working("preparing the land for ROAM", 0.0);
+                    }
                     first.follow(wish.first);
                     match (&mut second, wish.second) {
                         (Some(second), Some(detail)) => second.follow(detail),
-                        (None, Some(detail)) => second = Some(Chooser::new(stage.land(), &bounds, detail)),
+                        (None, Some(detail)) => second = Some(Chooser::new(stage.land(), &prepared, detail)),
                         (_, None) => second = None,
                     }
-                    let sea = waves.as_mut().or(still.as_mut()).filter(|_| stage.shows_waves());
+                    if !ready {
+                        voice.idle();
+                    }
+                    let sea = waves.as_mut().or(still.as_mut());
                     number += 1;
                     let grey = meter.grey(&stage, &wish.eye);
-                    let made = frame(&mut first, second.as_mut(), sea, wish);
-                    if let Err(problem) = show_waves(&scenery, gpu, waves.as_ref(), &mut seen) {
+                    let made = frame(&mut first, second.as_mut(), sea, wish, visibility);
+                    if let Err(problem) =
+                        show_waves(&scenery, gpu, waves.as_ref().filter(|_| stage.shows_waves()), &mut seen)
+                    {
                         voice.tell(News::Note(problem));
                     }
                     let tide = (waves.is_some(), waves.as_ref().map_or(0.0, Sea::time));
@@ -374,11 +425,14 @@ fn fly(
                         }
                         placed = Some(tide);
                     }
+                    answered = Some(wish.clone());
                     match made {
-                        Ok(frame) => voice.tell(News::Frame(Box::new(Frame { serial, number, grey, ..frame }))),
+                        Ok(frame) => {
+                            answered = answered.filter(|_| !frame.is_unfinished());
+                            voice.tell(News::Frame(Box::new(Frame { serial, number, grey, ..frame })));
+                        }
                         Err(problem) => voice.tell(News::Note(problem)),
                     }
-                    answered = Some(wish.clone());
                 }
                 if let Some(newest) = slot.wait(NAP)? {
                     *wish = newest;
@@ -389,7 +443,7 @@ fn fly(
 }
 
 /// The scene of a land in a light.
-fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
+fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look, drape: Option<&'a Drape>) -> Scene<'a> {
     let air = match look.visibility {
         Some(visibility) => Air { visibility, veils_distance: true },
         None => suits.air,
@@ -400,7 +454,8 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
         objects: &subject.objects,
         sun: look.sun.unwrap_or(suits.sun),
         air,
-        style: picture::Style::Natural,
+        style: look.style,
+        drape,
         // Whoever flies comes within, sooner or later.
         border: Border::Mist,
         climate,
@@ -409,8 +464,11 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look) -> Scene<'a> {
     }
 }
 
+/// A sea, and its surf.
+type Made = (Sea, Option<Surf>);
+
 /// The sea of a state as typed.
-fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Sea, String> {
+fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Made, String> {
     let wrong =
         |problem: String| format!("sea state \"{text}\": {problem}; correct it, for example: beaufort=4,from=225");
     let state: SeaState = text.parse().map_err(|e: littoral::waves::spec::SpecError| wrong(e.to_string()))?;
@@ -421,15 +479,17 @@ fn sea(subject: &Subject, text: &str, voice: &Voice) -> Result<Sea, String> {
         voice.working("carrying the waves over the bed", done as f32);
         true
     };
-    Sea::over(&subject.land, water, &state, &told).map_err(|e| wrong(e.to_string()))
+    let sea = Sea::over(&subject.land, water, &state, &told).map_err(|e| wrong(e.to_string()))?;
+    Ok((sea, Surf::of(&subject.land, water, &state)))
 }
 
-/// The meshes that are wished for.
+/// The meshes that are wished for, where one sees so far (m).
 fn frame(
     first: &mut Chooser,
     second: Option<&mut Chooser>,
     sea: Option<&mut Sea>,
     wish: &Wish,
+    visibility: f64,
 ) -> Result<Frame, String> {
     let sea = sea.map(|sea| {
         if sea.time() != wish.time {
@@ -438,7 +498,7 @@ fn frame(
         &*sea
     });
     let waves = sea.filter(|_| wish.waves);
-    let chosen = |chooser: &mut Chooser| choose(chooser, waves, &wish.view).map_err(|e| e.to_string());
+    let chosen = |chooser: &mut Chooser| choose(chooser, waves, &wish.view, visibility).map_err(|e| e.to_string());
     let heights = sea.zip(wish.probes).map(|(sea, probes)| {
         let mut heights = [0.0; 4];
         sea.heights_at(&probes, &mut heights);
@@ -472,14 +532,14 @@ fn show_waves(scenery: &Scenery, gpu: &Gpu, sea: Option<&Sea>, seen: &mut (bool,
 }
 
 /// What a method chooses for a view.
-fn choose(chooser: &mut Chooser, sea: Option<&Sea>, view: &View) -> Result<Choice, ViewError> {
+fn choose(chooser: &mut Chooser, sea: Option<&Sea>, view: &View, visibility: f64) -> Result<Choice, ViewError> {
     let started = Instant::now();
     let detail = chooser.detail();
     let view = View { tolerance_pixels: detail.tolerance_pixels as f32, ..*view };
-    let (ground, ground_reached) = chooser.ground(&view)?;
-    let (water, water_reached) = sea.map(|sea| chooser.water(sea, &view)).transpose()?.unzip();
+    let ground = chooser.ground(&view, visibility)?;
+    let water = sea.map(|sea| chooser.water(sea, &view)).transpose()?;
     let milliseconds = started.elapsed().as_secs_f64() * 1e3;
-    Ok(Choice { detail, ground, water, ground_reached, water_reached, milliseconds })
+    Ok(Choice { detail, ground, water, milliseconds })
 }
 
 /// Meters the light, as a photographer does: by a small picture of what is seen, now and then.

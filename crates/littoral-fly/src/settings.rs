@@ -1,7 +1,9 @@
 //! What is remembered from one flight to the next: a readable file in the user's folder for settings.
 
 use crate::camera::Mode;
+use crate::detail::{Detail, within};
 use littoral::lod::Method;
+use littoral::picture;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -12,21 +14,41 @@ pub enum Style {
     /// In the light of the data: every pixel is lit once, whatever the triangles.
     #[default]
     Natural,
+    /// So lit, in colours by height.
+    Tint,
+    /// A cartographer's shaded relief.
+    Relief,
+    /// So lit, under a picture of the ground.
+    Image,
     /// The triangles themselves, flatly lit; waves are triangles, too.
     Plain,
 }
 
 impl Style {
     /// All of them.
-    pub const ALL: [Style; 2] = [Style::Natural, Style::Plain];
+    pub const ALL: [Style; 5] = [Style::Natural, Style::Tint, Style::Relief, Style::Image, Style::Plain];
 
     /// What it is called, and what it does.
     pub fn words(self) -> (&'static str, &'static str) {
         match self {
             Style::Natural => ("Natural", "Rock, scree, grass, woods, sand, snow and the sea in the light of the day"),
+            Style::Tint => ("Tint", "Colours by height, land and sea bed, in the light on the relief"),
+            Style::Relief => ("Relief", "A cartographer's shaded relief"),
+            Style::Image => ("Image", "A picture laid over the ground: drop one on the window, or name it below"),
             Style::Plain => {
                 ("Plain", "The triangles themselves, flatly lit, waves as well: quick without a graphics card")
             }
+        }
+    }
+
+    /// How the light falls on it; `None` for triangles themselves.
+    pub fn lit(self) -> Option<picture::Style> {
+        match self {
+            Style::Natural => Some(picture::Style::Natural),
+            Style::Tint => Some(picture::Style::Tint),
+            Style::Relief => Some(picture::Style::Relief),
+            Style::Image => Some(picture::Style::Image),
+            Style::Plain => None,
         }
     }
 }
@@ -85,36 +107,21 @@ impl Split {
     }
 }
 
-/// A method of detail, and how finely it draws.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Detail {
-    /// How triangles are chosen.
-    #[serde(with = "by_name")]
-    pub method: Method,
-    /// How far from its place the mesh may be drawn (pixels).
-    pub tolerance_pixels: f64,
-    /// The most triangles of the ground, and as many of the sea.
-    pub triangles: u32,
-    /// Whether natural pictures show the exact ground by rays in place of the mesh.
-    pub rays: bool,
+/// A picture that is laid over a land.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Laid {
+    /// The picture's file.
+    pub picture: PathBuf,
+    /// The land's; none for the built-in coast.
+    pub over: Vec<PathBuf>,
 }
 
-impl Detail {
-    /// What its pictures are called in a style.
-    pub fn name(&self, style: Style, show: Show) -> &'static str {
-        if self.shows_rays(style, show) { "rays" } else { self.method.name() }
-    }
-
-    /// Whether pictures of a style show the ground by rays: edges belong to triangles.
-    pub fn shows_rays(&self, style: Style, show: Show) -> bool {
-        self.rays && style == Style::Natural && show == Show::Textured
-    }
-}
-
-impl Default for Detail {
-    fn default() -> Detail {
-        Detail { method: Method::Quadtree, tolerance_pixels: 1.0, triangles: 150_000, rays: false }
+impl Laid {
+    /// A picture over the land of some files, by names that hold wherever the program is started next time.
+    pub fn new(picture: &Path, over: &[PathBuf]) -> Laid {
+        let absolute = |file: &Path| std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+        Laid { picture: absolute(picture), over: over.iter().map(|file| absolute(file)).collect() }
     }
 }
 
@@ -201,20 +208,9 @@ pub struct Settings {
     pub first: Detail,
     /// And those of the second picture.
     pub second: Detail,
-}
-
-/// Methods are saved by their names.
-mod by_name {
-    use littoral::lod::Method;
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    pub fn serialize<S: Serializer>(method: &Method, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(method.name())
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Method, D::Error> {
-        String::deserialize(from)?.parse().map_err(D::Error::custom)
-    }
+    /// The picture of the ground.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub laid: Option<Laid>,
 }
 
 /// The newest version of the file.
@@ -249,6 +245,7 @@ impl Default for Settings {
             gain: 8.0,
             first: Detail::default(),
             second: Detail { method: Method::Whole, ..Detail::default() },
+            laid: None,
         }
     }
 }
@@ -285,20 +282,9 @@ impl Settings {
     fn sound(mut self, file: &Path) -> (Settings, Option<String>) {
         let mut wrong = Vec::new();
         let usual = Settings::default();
-        let mut number = |name: &'static str, value: &mut f64, usual: f64, low: f64, high: f64| {
-            if !(low..=high).contains(value) {
-                *value = usual;
-                wrong.push(name);
-            }
+        let mut number = |name: &str, value: &mut f64, usual: f64, low: f64, high: f64| {
+            within(name, value, usual, low..=high, &mut wrong);
         };
-        number("first.tolerance_pixels", &mut self.first.tolerance_pixels, usual.first.tolerance_pixels, 0.05, 100.0);
-        number(
-            "second.tolerance_pixels",
-            &mut self.second.tolerance_pixels,
-            usual.second.tolerance_pixels,
-            0.05,
-            100.0,
-        );
         number("budget_milliseconds", &mut self.budget_milliseconds, usual.budget_milliseconds, 0.0, 10_000.0);
         number("gain", &mut self.gain, usual.gain, 1.0, 255.0);
         number("sun_azimuth_degrees", &mut self.sun_azimuth_degrees, usual.sun_azimuth_degrees, 0.0, 360.0);
@@ -310,16 +296,9 @@ impl Settings {
         number("exaggeration", &mut self.exaggeration, usual.exaggeration, 0.01, 1000.0);
         number("speed", &mut self.speed, usual.speed, 0.01, 100.0);
         number("field_degrees", &mut self.field_degrees, usual.field_degrees, 5.0, 120.0);
-        for (name, detail) in [("first.triangles", &mut self.first), ("second.triangles", &mut self.second)] {
-            if !(1000..=20_000_000).contains(&detail.triangles) {
-                detail.triangles = Detail::default().triangles;
-                wrong.push(name);
-            }
-        }
-        if !(1..=8).contains(&self.coarse) {
-            self.coarse = usual.coarse;
-            wrong.push("coarse");
-        }
+        within("coarse", &mut self.coarse, usual.coarse, 1..=8, &mut wrong);
+        self.first.put_right("first", &mut wrong);
+        self.second.put_right("second", &mut wrong);
         let message = (!wrong.is_empty())
             .then(|| format!("{}: {} out of range; the usual taken", file.display(), wrong.join(", ")));
         (self, message)

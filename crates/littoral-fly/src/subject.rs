@@ -4,6 +4,7 @@ use glam::{DAffine2, DVec2, DVec3};
 use littoral::field::{Lakes, Land, Water, coast};
 use littoral::flight::FlightPath;
 use littoral::objects::{Footing, Standing};
+use littoral::picture::Drape;
 use littoral::space::{Ray, View};
 use littoral_data::path::{Coordinates, SavedPath};
 use littoral_data::{Crs, Georeference, LoadOptions, ObjectOrder, VerticalDatum};
@@ -45,6 +46,15 @@ pub struct Subject {
     crs_from_local: DAffine2,
 }
 
+/// Why what was ordered is no land.
+#[derive(Debug)]
+pub enum Refusal {
+    /// What went wrong.
+    Problem(String),
+    /// It is a picture of something.
+    Picture(PathBuf),
+}
+
 /// At most so many samples are taken: a larger file is averaged down.
 const FITTING: usize = 16 << 20;
 
@@ -53,7 +63,14 @@ const REACH: f64 = 1e7;
 
 impl Subject {
     /// Opens what is ordered. `told` hears what is being done, and how much of it is done, in [0, 1].
-    pub fn open(order: &Order, told: &dyn Fn(&str, f32)) -> Result<Subject, String> {
+    pub fn open(order: &Order, told: &dyn Fn(&str, f32)) -> Result<Subject, Refusal> {
+        match &order.files[..] {
+            [file] if littoral_data::is_picture(file) => Err(Refusal::Picture(file.clone())),
+            _ => Subject::heights(order, told).map_err(Refusal::Problem),
+        }
+    }
+
+    fn heights(order: &Order, told: &dyn Fn(&str, f32)) -> Result<Subject, String> {
         let files = &order.files;
         let (name, land, georeference, datum, notes) = if files.is_empty() {
             told("making the built-in coast", 0.0);
@@ -138,6 +155,15 @@ impl Subject {
                     .push(format!("{file}: neither ground nor water at {},{}; move it", order.at.x, order.at.y)),
             }
         }
+    }
+
+    /// A picture as it lies over this land, and what was noticed.
+    pub fn drape(&self, file: &Path) -> Result<(Drape, Vec<String>), String> {
+        let nowhere = Georeference::none(2, 2);
+        let place = self.georeference.as_ref().unwrap_or(&nowhere);
+        let (drape, noticed) =
+            littoral_data::open_drape(file, &self.land, place, self.crs_from_local).map_err(|e| e.to_string())?;
+        Ok((drape, noticed.into_iter().map(|words| format!("{}: {words}", shown_name(file))).collect()))
     }
 
     /// The angle from the land's y axis clockwise to true north (rad).

@@ -1,19 +1,17 @@
 //! The window: events in, pictures out. It never waits for the scene.
 
 use crate::Arguments;
-use crate::camera::{Hands, Mode};
-use crate::cockpit::{Cockpit, median};
-use crate::compare::Difference;
+use crate::camera::Hands;
+use crate::cockpit::Cockpit;
 use crate::film::Filming;
-use crate::keys;
 use crate::paint::{Gui, Missed, Paint};
 use crate::panel::{self, Ask, Shown};
 use crate::scene::{self, News, Slot, Voice};
 use crate::settings::Settings;
-use glam::{DVec2, UVec2, Vec2};
-use littoral_data::write::{PngPixels, png};
+use glam::{UVec2, Vec2};
+use smoke::Smoke;
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,6 +23,10 @@ use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{Window, WindowId};
+
+mod hands;
+mod records;
+mod smoke;
 
 /// Opens the window and flies until it is closed.
 pub fn run(arguments: Arguments, settings: Settings, note: Option<String>) -> Result<(), String> {
@@ -87,33 +89,6 @@ struct Flight {
     smoke: Option<Smoke>,
 }
 
-/// A flight that ends after some frames and tells its times.
-struct Smoke {
-    frames: u32,
-    milliseconds: Vec<f32>,
-    method: Vec<f32>,
-    triangles: Vec<f32>,
-    bound: Vec<f32>,
-    /// When it gives up waiting for a first frame.
-    begun: Instant,
-}
-
-#[derive(serde::Serialize)]
-struct Answer {
-    frames: u32,
-    width: u32,
-    height: u32,
-    method: &'static str,
-    frame_ms: f32,
-    method_ms: f32,
-    triangles: f32,
-    bound_pixels: f32,
-    tolerance_pixels: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    difference: Option<Difference>,
-    adapter: String,
-}
-
 impl Flight {
     fn new(events: &ActiveEventLoop, app: &mut App) -> Result<Flight, String> {
         let arguments = &app.arguments;
@@ -165,14 +140,7 @@ impl Flight {
             .spawn(move || scene::run(&its, &voice, &gpu))
             .map_err(|e| format!("expected to start a thread, got an error: {e}; close other programs"))?;
         let adapter = format!("{} ({})", paint.gpu.adapter.name, paint.gpu.adapter.backend);
-        let smoke = arguments.smoke.map(|frames| Smoke {
-            frames,
-            milliseconds: Vec::new(),
-            method: Vec::new(),
-            triangles: Vec::new(),
-            bound: Vec::new(),
-            begun: Instant::now(),
-        });
+        let smoke = arguments.smoke.map(Smoke::new);
         Ok(Flight {
             window,
             paint,
@@ -235,6 +203,7 @@ impl Flight {
             Ok(rests) => {
                 self.cockpit.rests = rests;
                 self.cockpit.difference = self.paint.difference();
+                self.cockpit.history.uploaded(self.paint.take_uploads());
                 self.count(passed, events)?;
             }
             Err(Missed::Frame) => std::thread::sleep(std::time::Duration::from_millis(5)),
@@ -245,29 +214,6 @@ impl Flight {
         }
         self.film();
         Ok(())
-    }
-
-    /// What keys ask for.
-    #[cfg(not(feature = "gamepad"))]
-    fn hands(&mut self, _: &ActiveEventLoop) -> Hands {
-        keys::hands(&self.held)
-    }
-
-    /// What keys and gamepads ask for.
-    #[cfg(feature = "gamepad")]
-    fn hands(&mut self, events: &ActiveEventLoop) -> Hands {
-        use crate::gamepad::{Gamepads, Pressed, both};
-        let (pads, buttons) = self.gamepads.as_mut().map(Gamepads::read).unwrap_or_default();
-        for button in buttons {
-            match button {
-                Pressed::Key(key) => self.pressed(key, events),
-                Pressed::NextMode => {
-                    self.cockpit.change_mode(neighbour(&Mode::ALL, self.cockpit.camera.mode(), false));
-                }
-                Pressed::Faster(by) => self.cockpit.faster(by),
-            }
-        }
-        both(&keys::hands(&self.held), &pads)
     }
 
     /// Takes what the scene told.
@@ -292,6 +238,13 @@ impl Flight {
         }
     }
 
+    /// Whether the mouse is over something of the panel's.
+    fn is_over_panel(&self) -> bool {
+        let context = self.egui.egui_ctx();
+        let at = self.cursor / context.pixels_per_point();
+        self.shown.covers(context, egui::pos2(at.x, at.y))
+    }
+
     /// Runs the panel.
     fn gui(&mut self, size: UVec2) -> Gui {
         let mut asks = Vec::new();
@@ -310,228 +263,6 @@ impl Flight {
         let scale = output.pixels_per_point;
         Gui { primitives: context.tessellate(output.shapes, scale), textures: output.textures_delta, scale }
     }
-
-    /// Counts a frame of a smoke flight, and ends it after the last.
-    fn count(&mut self, passed: f64, events: &ActiveEventLoop) -> Result<(), String> {
-        let Some(smoke) = &mut self.smoke else { return Ok(()) };
-        let (Some(frame), Some(_)) = (&self.cockpit.frame, &self.cockpit.scenery) else {
-            const PATIENCE: u64 = 300;
-            return match smoke.begun.elapsed().as_secs() > PATIENCE {
-                true => Err(format!("expected a first picture within {PATIENCE} s, got none; try a smaller file")),
-                false => Ok(()),
-            };
-        };
-        smoke.milliseconds.push((passed * 1e3) as f32);
-        smoke.method.push(frame.first.milliseconds as f32);
-        smoke.triangles.push(frame.first.triangles() as f32);
-        smoke.bound.push(frame.first.ground_reached.pixels);
-        if smoke.milliseconds.len() as u32 >= smoke.frames {
-            let size = self.paint.size();
-            let answer = Answer {
-                frames: smoke.frames,
-                width: size.x,
-                height: size.y,
-                method: self.cockpit.settings.first.method.name(),
-                frame_ms: median(smoke.milliseconds.iter().copied()),
-                method_ms: median(smoke.method.iter().copied()),
-                triangles: median(smoke.triangles.iter().copied()),
-                bound_pixels: median(smoke.bound.iter().copied()),
-                tolerance_pixels: self.cockpit.first().tolerance_pixels,
-                difference: self.cockpit.difference.filter(|_| self.cockpit.second().is_some()),
-                adapter: self.shown.adapter.clone(),
-            };
-            println!("{}", serde_json::to_string(&answer).map_err(|e| e.to_string())?);
-            events.exit();
-        }
-        Ok(())
-    }
-
-    /// Saves what is seen under the first name that is free.
-    fn picture(&mut self, gui: Option<&Gui>) {
-        let free = (1..100_000).map(|i| PathBuf::from(format!("littoral-{i}.png"))).find(|file| !file.exists());
-        let Some(file) = free else { return };
-        let size = self.paint.size();
-        let name = self.cockpit.subject.as_ref().map_or(String::new(), |subject| subject.name.clone());
-        let notes = [("Software", "littoral-fly".to_owned()), ("Source", name)];
-        let saved = self
-            .paint
-            .copy(&self.cockpit, gui)
-            .and_then(|pixels| png(&file, size.x, size.y, PngPixels::Rgb8(&pixels), &notes).map_err(|e| e.to_string()));
-        self.cockpit.note(match saved {
-            Ok(()) => format!("picture saved in {}", file.display()),
-            Err(problem) => problem,
-        });
-    }
-
-    fn toggle_film(&mut self) {
-        if let Some(filming) = self.filming.take() {
-            let said = filming.end(&mut self.cockpit.time);
-            self.cockpit.note(said);
-            self.shown.film = None;
-            return;
-        }
-        match Filming::new(&self.cockpit, self.paint.size()) {
-            Ok(filming) => self.filming = Some(filming),
-            Err(problem) => self.cockpit.note(problem),
-        }
-    }
-
-    /// Films the frame that has come, if one has.
-    fn film(&mut self) {
-        let Some(filming) = &mut self.filming else { return };
-        let size = self.paint.size();
-        let done = match filming.awaits(&self.cockpit, size) {
-            Err(problem) => Err(problem),
-            Ok(false) => Ok(false),
-            Ok(true) => self.paint.copy(&self.cockpit, None).and_then(|pixels| filming.frame(&pixels)),
-        };
-        self.shown.film = Some(filming.done());
-        match done {
-            Ok(false) => {}
-            Ok(true) => self.toggle_film(),
-            Err(problem) => {
-                self.toggle_film();
-                self.cockpit.note(problem);
-            }
-        }
-    }
-
-    fn pressed(&mut self, key: KeyCode, events: &ActiveEventLoop) {
-        let held = |keys: [KeyCode; 2]| keys.iter().any(|key| self.held.contains(key));
-        let control = held([KeyCode::ControlLeft, KeyCode::ControlRight]);
-        let shift = held([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
-        let size = self.paint.size();
-        let cockpit = &mut self.cockpit;
-        if control {
-            match key {
-                KeyCode::KeyZ if shift => cockpit.editor.redo(),
-                KeyCode::KeyZ => cockpit.editor.undo(),
-                KeyCode::KeyY => cockpit.editor.redo(),
-                KeyCode::KeyS => cockpit.save_path(),
-                KeyCode::KeyO => {
-                    let file = cockpit.path_file.clone();
-                    cockpit.load_path(Path::new(file.trim()));
-                }
-                KeyCode::KeyQ => events.exit(),
-                _ => {}
-            }
-            return;
-        }
-        use crate::settings::{Show, Split, Style};
-        use littoral::lod::Method;
-        let settings = &mut cockpit.settings;
-        match key {
-            KeyCode::F1 => self.shown.help = !self.shown.help,
-            KeyCode::Escape => self.shown.help = false,
-            KeyCode::Tab => settings.panel = !settings.panel,
-            KeyCode::F12 => self.pictures.push(shift),
-            KeyCode::Digit1 => cockpit.change_mode(Mode::Fly),
-            KeyCode::Digit2 => cockpit.change_mode(Mode::Orbit),
-            KeyCode::Digit3 => cockpit.change_mode(Mode::Walk),
-            KeyCode::Digit4 => cockpit.change_mode(Mode::Boat),
-            KeyCode::Home => cockpit.home(),
-            KeyCode::KeyM => settings.first.method = neighbour(&Method::ALL, settings.first.method, shift),
-            KeyCode::KeyV => settings.split = neighbour(&Split::ALL, settings.split, shift),
-            KeyCode::KeyX => settings.show = neighbour(&Show::ALL, settings.show, shift),
-            KeyCode::KeyT => settings.style = neighbour(&Style::ALL, settings.style, shift),
-            KeyCode::Equal | KeyCode::NumpadAdd => {
-                settings.first.tolerance_pixels = (settings.first.tolerance_pixels / 1.25).max(0.1);
-            }
-            KeyCode::Minus | KeyCode::NumpadSubtract => {
-                settings.first.tolerance_pixels = (settings.first.tolerance_pixels * 1.25).min(50.0);
-            }
-            KeyCode::KeyF => cockpit.freeze(size),
-            KeyCode::KeyL => cockpit.editing = !cockpit.editing,
-            KeyCode::KeyB => {
-                let subject = cockpit.subject.clone();
-                cockpit.editor.add_eye(cockpit.camera.eye, &|at| subject.as_ref()?.surface(at));
-            }
-            KeyCode::Delete => {
-                if let Some(point) = cockpit.editor.selected {
-                    cockpit.editor.remove(point);
-                }
-            }
-            KeyCode::KeyP => cockpit.play(),
-            KeyCode::KeyR => self.toggle_film(),
-            KeyCode::Space if cockpit.playing.is_some() => cockpit.paused = !cockpit.paused,
-            KeyCode::Space => cockpit.still = !cockpit.still,
-            _ => {}
-        }
-    }
-
-    fn button(&mut self, button: MouseButton, down: bool) {
-        if !down {
-            if self.looking == Some(button) {
-                self.looking = None;
-            }
-            if button == MouseButton::Left {
-                self.dragged = None;
-                self.cockpit.editor.release();
-            }
-            return;
-        }
-        if button == MouseButton::Left && self.cockpit.editing {
-            let Some(subject) = self.cockpit.subject.clone() else { return };
-            let view = self.cockpit.view(self.paint.size());
-            let scale = self.egui.egui_ctx().pixels_per_point();
-            let surface = |at| subject.surface(at);
-            match self.cockpit.editor.pick(&view, self.cursor, 10.0 * scale, &surface) {
-                Some(point) => {
-                    self.cockpit.editor.selected = Some(point);
-                    self.dragged = Some(point);
-                }
-                None => match subject.seen(&view, self.cursor) {
-                    Some(place) => {
-                        self.cockpit.editor.add(place);
-                        self.dragged = self.cockpit.editor.selected;
-                    }
-                    None => self.cockpit.note("expected a click on the ground, got one on the sky; click lower"),
-                },
-            }
-        } else {
-            self.looking = Some(button);
-        }
-    }
-
-    fn moved(&mut self, to: Vec2) {
-        let by = to - self.cursor;
-        self.cursor = to;
-        if let (Some(point), Some(subject)) = (self.dragged, self.cockpit.subject.clone()) {
-            // A click that trembles drags nothing.
-            let view = self.cockpit.view(self.paint.size());
-            if by.length() > 0.0
-                && let Some(place) = subject.seen(&view, to)
-            {
-                self.cockpit.editor.move_to(point, place.truncate());
-            }
-        } else if self.looking.is_some() {
-            let radians = 1.0 / f64::from(self.cockpit.view(self.paint.size()).pixels_per_radian);
-            // The ground under the cursor follows it.
-            self.cockpit.camera.look(DVec2::new(-f64::from(by.x), f64::from(by.y)) * radians);
-        }
-    }
-
-    fn wheel(&mut self, by: f64) {
-        let cockpit = &mut self.cockpit;
-        if let (true, Some(point)) = (cockpit.editing, cockpit.editor.selected) {
-            let surface = {
-                let subject = cockpit.subject.clone();
-                move |at| subject.as_ref()?.surface(at)
-            };
-            let far = cockpit.editor.position(point, &surface).map_or(100.0, |at| at.distance(cockpit.camera.eye));
-            cockpit.editor.raise(point, (by * 0.01 * far).round());
-        } else if cockpit.camera.mode() == Mode::Orbit {
-            cockpit.camera.zoom(0.15 * by);
-        } else {
-            cockpit.faster(1.2f64.powf(by));
-        }
-    }
-}
-
-/// The next of a list, or the one before.
-fn neighbour<T: Copy + PartialEq>(all: &[T], now: T, back: bool) -> T {
-    let at = all.iter().position(|each| *each == now).unwrap_or(0);
-    all[(at + if back { all.len() - 1 } else { 1 }) % all.len()]
 }
 
 impl ApplicationHandler for App {
@@ -583,11 +314,11 @@ impl ApplicationHandler for App {
             }
             WindowEvent::MouseInput { state, button, .. } => {
                 let down = state == ElementState::Pressed;
-                if !down || !context.is_pointer_over_egui() {
+                if !down || !flight.is_over_panel() {
                     flight.button(button, down);
                 }
             }
-            WindowEvent::MouseWheel { delta, .. } if !context.is_pointer_over_egui() => {
+            WindowEvent::MouseWheel { delta, .. } if !flight.is_over_panel() => {
                 flight.wheel(match delta {
                     MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
                     MouseScrollDelta::PixelDelta(pixels) => pixels.y / 50.0,

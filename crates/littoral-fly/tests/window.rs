@@ -101,23 +101,29 @@ fn differ(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
     a.iter().zip(b).map(off).sum::<f64>() / a.len().min(b.len()) as f64
 }
 
+/// The program, started in a folder that it also keeps its settings in.
+fn started(display: &str, folder: &Path, arguments: &[&str]) -> Ended {
+    let mut command = Command::new(PROGRAM);
+    command.args(arguments).current_dir(folder).env("DISPLAY", display).env_remove("WAYLAND_DISPLAY");
+    command.env("XDG_CONFIG_HOME", folder).env("XDG_RUNTIME_DIR", folder).stderr(Stdio::piped());
+    Ended(command.spawn().expect("starts"))
+}
+
+/// Writes a picture in one colour.
+fn write_picture(file: &Path, colour: [u8; 3]) {
+    let mut encoder = png::Encoder::new(std::fs::File::create(file).expect("a file"), 64, 64);
+    encoder.set_color(png::ColorType::Rgb);
+    let mut writer = encoder.write_header().expect("a header");
+    writer.write_image_data(&colour.repeat(64 * 64)).expect("pixels");
+}
+
 #[test]
 fn a_flight_by_keys_and_clicks() {
     let Some((display, _server)) = display() else { return };
     let folder = tempfile::tempdir().expect("a folder");
     let settings = folder.path().join("littoral/fly.toml");
-    let mut program = Ended(
-        Command::new(PROGRAM)
-            .args(["missing.tif", "--size", "800x450", "--tolerance", "4", "--triangles", "20000"])
-            .current_dir(folder.path())
-            .env("DISPLAY", &display)
-            .env("XDG_CONFIG_HOME", folder.path())
-            .env("XDG_RUNTIME_DIR", folder.path())
-            .env_remove("WAYLAND_DISPLAY")
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("starts"),
-    );
+    let arguments = ["missing.tif", "--size", "800x450", "--tolerance", "4", "--triangles", "20000"];
+    let mut program = started(&display, folder.path(), &arguments);
     let xdotool = |arguments: &[&str]| {
         let output = Command::new("xdotool").args(arguments).env("DISPLAY", &display).output().expect("xdotool runs");
         String::from_utf8_lossy(&output.stdout).trim().to_owned()
@@ -173,6 +179,19 @@ fn a_flight_by_keys_and_clicks() {
     key("x");
     key("x");
 
+    // Colours by height look otherwise; of a picture there is none yet; triangles themselves look otherwise again.
+    let natural = take();
+    key("t");
+    let tint = wait(60, "tints", || Some(take()).filter(|tint| differ(&natural.2, &tint.2) > 5.0));
+    assert!(shows_something(&tint));
+    for _ in 0..3 {
+        key("t");
+    }
+    let plain = wait(60, "triangles themselves", || Some(take()).filter(|plain| differ(&tint.2, &plain.2) > 5.0));
+    assert!(shows_something(&plain));
+    key("t");
+    wait(60, "natural colours again", || Some(take()).filter(|again| differ(&natural.2, &again.2) < 5.0));
+
     // A second method beside the first, how they differ, and the first alone again.
     let bright =
         |picture: &[[u8; 3]]| picture.iter().flatten().map(|v| f64::from(*v)).sum::<f64>() / picture.len() as f64;
@@ -221,5 +240,66 @@ fn a_flight_by_keys_and_clicks() {
     let remembered = std::fs::read_to_string(&settings).expect("settings are saved");
     for line in ["method = \"patches\"", "mode = \"boat\"", "triangles = 20000", "split = \"off\""] {
         assert!(remembered.contains(line), "{line} in {remembered}");
+    }
+}
+
+#[test]
+fn a_picture_is_laid_over_the_land_and_remembered() {
+    let Some((display, _server)) = display() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("ground.png");
+    write_picture(&file, [220, 30, 160]);
+    let arguments = ["--size", "640x360", "--tolerance", "8", "--triangles", "20000"];
+    let laid = [&arguments[..], &["--texture", "ground.png"]].concat();
+    // Named by the command first, from the settings then; at last the picture is gone.
+    for (round, arguments) in [&laid[..], &arguments, &arguments].into_iter().enumerate() {
+        let mut program = started(&display, folder.path(), arguments);
+        let xdotool = |arguments: &[&str]| {
+            let output =
+                Command::new("xdotool").args(arguments).env("DISPLAY", &display).output().expect("xdotool runs");
+            String::from_utf8_lossy(&output.stdout).trim().to_owned()
+        };
+        let mut ended = None;
+        let window = wait(180, "a window over the coast", || {
+            ended = program.0.try_wait().expect("asked");
+            let found = xdotool(&["search", "--name", "Littoral: the built-in coast"]);
+            (ended.is_some() || !found.is_empty()).then_some(found)
+        });
+        if ended.is_some() {
+            let mut said = String::new();
+            let _ = program.0.stderr.take().map(|mut stderr| stderr.read_to_string(&mut said));
+            assert!(said.contains("expected a graphics adapter"), "the program ended: {said}");
+            println!("the window goes untested: {said}");
+            return;
+        }
+        xdotool(&["windowfocus", window.lines().last().unwrap_or_default()]);
+        let mut pictures = 0;
+        let mut take = || {
+            let name = |number| folder.path().join(format!("littoral-{number}.png"));
+            pictures = (1..).find(|number| !name(*number).exists()).expect("free");
+            xdotool(&["key", "--clearmodifiers", "F12"]);
+            wait(60, "a picture", || picture(&name(pictures)))
+        };
+        // The ground is as pink as the picture, or nowhere.
+        let pink = |picture: &(usize, usize, Vec<[u8; 3]>)| {
+            let is = |p: &&[u8; 3]| i32::from(p[0]) > i32::from(p[1]) + 60 && i32::from(p[2]) > i32::from(p[1]) + 30;
+            picture.2.iter().filter(is).count() as f64 / picture.2.len() as f64
+        };
+        if round < 2 {
+            wait(120, "the picture on the ground", || Some(take()).filter(|shown| pink(shown) > 0.15));
+        } else {
+            let natural = wait(120, "a picture of something", || Some(take()).filter(shows_something));
+            assert!(pink(&natural) < 0.01, "{} of it pink", pink(&natural));
+        }
+        xdotool(&["key", "--clearmodifiers", "ctrl+q"]);
+        let status = wait(60, "an end", || program.0.try_wait().expect("asked"));
+        assert!(status.success(), "{status}");
+        let remembered = std::fs::read_to_string(folder.path().join("littoral/fly.toml")).expect("settings are saved");
+        let style = if round < 2 { "style = \"image\"" } else { "style = \"natural\"" };
+        assert!(remembered.contains(style), "{remembered}");
+        assert_eq!(remembered.contains("ground.png"), round < 2, "{remembered}");
+        if round == 1 {
+            std::fs::remove_file(&file).expect("removed");
+        }
     }
 }

@@ -129,11 +129,37 @@ fn still_water_is_level() {
     assert!(range.contains(2.25) && range.high - range.low < 1e-3);
 }
 
+/// A beach on one side, from dry land to deep water, a few metres of it too shallow for any wave.
+fn beach() -> Land {
+    let heights = (0..48 * 40).map(|i| 3.0 - 0.02 * ((i % 48) as f32).powi(2)).collect();
+    Land::at(Raster::new(48, 40, DVec2::splat(12.0), heights).expect("a bed"), DVec2::ZERO)
+}
+
+#[test]
+fn waves_that_break_early_are_lower_in_the_surf_and_no_lower_beyond() {
+    let land = beach();
+    let water = Water::flood(&land, 0.0).expect("wet");
+    // The root of the mean square (m) along the shore now and then, where the water is 2.6 m deep, and where it is 29 m.
+    let heights = |spec: &str| {
+        let mut sea = Sea::over(&land, &water, &spec.parse().expect("a state"), &|_| true).expect("a sea");
+        let mut squares = [0.0; 2];
+        for i in 0..60 {
+            sea.set_time(f64::from(i) * 17.0);
+            for (square, x) in squares.iter_mut().zip([200.0, 480.0]) {
+                *square +=
+                    (0..8).map(|k| sea.height_at(DVec2::new(x, 60.0 + 50.0 * f64::from(k))).powi(2)).sum::<f64>();
+            }
+        }
+        squares.map(|square| (square / 480.0).sqrt())
+    };
+    let ([near, far], [lower, as_far]) = (heights("hs=2,tp=9,from=90"), heights("hs=2,tp=9,from=90,breaking=0.4"));
+    assert!(lower < 0.75 * near, "{lower} m for {near} m in the surf");
+    assert!((as_far / far - 1.0).abs() < 0.05, "{as_far} m for {far} m beyond");
+}
+
 #[test]
 fn a_bed_takes_every_state() {
-    // A beach on one side, from dry land to deep water, a few metres of it too shallow for any wave.
-    let heights = (0..48 * 40).map(|i| 3.0 - 0.02 * ((i % 48) as f32).powi(2)).collect();
-    let land = Land::at(Raster::new(48, 40, DVec2::splat(12.0), heights).expect("a bed"), DVec2::ZERO);
+    let land = beach();
     let water = Water::flood(&land, 0.0).expect("wet");
     for number in 1..=12 {
         let state = SeaState::beaufort(f64::from(number), 3.0).expect("a number");

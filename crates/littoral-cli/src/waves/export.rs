@@ -46,7 +46,7 @@ tile.json, which says what is printed with --json: range (m), tile (m), size, sa
 longest wave (m), from (where waves come from), wind (m/s), wind_from, files, seconds.")]
 pub struct Export {
     /// The waves, as `littoral render --sea` takes them: wind=15,from=240; hs=2,tp=9; beaufort=6; douglas=4; buoy=FILE; with
-    /// swell=HEIGHT@PERIOD/FROM, fetch=KM, model=, gamma=, spread=, depth=, seed=
+    /// swell=HEIGHT@PERIOD/FROM, fetch=KM, model=, gamma=, spread=, depth=, breaking=, seed=
     #[arg(long, value_name = "SPEC")]
     sea: String,
     /// The file to write: .exr or .png; or a folder

@@ -38,7 +38,7 @@ array where several points are asked for, with null where it is dry; level (m, o
 time (s), hs (m, of the open sea).")]
 pub struct Height {
     /// The waves, as `littoral render --sea` takes them: wind=15,from=240; hs=2,tp=9; beaufort=6; douglas=4; calm; buoy=FILE; with
-    /// swell=HEIGHT@PERIOD/FROM, fetch=KM, model=, gamma=, spread=, depth=, seed= [default with --land coast: beaufort=4,from=225]
+    /// swell=HEIGHT@PERIOD/FROM, fetch=KM, model=, gamma=, spread=, depth=, breaking=, seed= [default with --land coast: beaufort=4,from=225]
     #[arg(long, value_name = "SPEC", required_unless_present = "land")]
     sea: Option<String>,
     /// Which of the seas of this state, as seed= in --sea [default: 0]

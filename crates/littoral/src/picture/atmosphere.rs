@@ -48,6 +48,13 @@ const M_HEIGHTS: usize = 24;
 const M_ANGLES: usize = 32;
 const S_HEIGHTS: usize = 256;
 
+/// The Ångström exponent of mixed aerosol; towards fog (m) the drops grow, until they veil all colours alike (I. Kim, B. McArthur and E. Korevaar, "Comparison of laser
+/// beam propagation at 785 nm and 1550 nm in fog and haze for optical wireless communications", 2001).
+fn angstrom_exponent(visibility: f32) -> f32 {
+    let km = visibility * 1e-3;
+    if km < 1.0 { (km - 0.5).max(0.0) } else { (0.16 * km + 0.34).min(1.2) }
+}
+
 impl Atmosphere {
     /// Air of some visibility under a sun of some elevation.
     pub fn new(air: &Air, sun: &Sun) -> Atmosphere {
@@ -56,10 +63,11 @@ impl Atmosphere {
             let l2 = (nm * 1e-3).powi(-2);
             0.008_569 * l2 * l2 * (1.0 + 0.0113 * l2 + 0.000_13 * l2 * l2) / RAYLEIGH_SCALE
         });
-        // Koschmieder: contrast 0.02 at the visibility; the Ångström exponent of mixed aerosol.
+        // Koschmieder: contrast 0.02 at the visibility.
         let visibility = air.visibility.clamp(500.0, 300_000.0) as f32;
         let haze = (3.912 / visibility - 0.0122e-3).max(1e-6);
-        let mie = Spectrum::of(|nm| haze * (nm / 550.0).powf(-1.2));
+        let exponent = angstrom_exponent(visibility);
+        let mie = Spectrum::of(|nm| haze * (nm / 550.0).powf(-exponent));
         // 300 Dobson units in a layer of triangular profile about 25 km: 5.37e18 molecules per m³ at its peak.
         let cross = [1.527e-27, 1.582e-26, 7.752e-26, 2.139e-25, 4.266e-25, 5.019e-25, 2.662e-25, 1.209e-25f32];
         let ozone = Spectrum(cross.map(|c| (f64::from(c) * 5.37e18) as f32));
@@ -457,6 +465,19 @@ fn mie_phase(cosine: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn fog_veils_all_colours_alike_and_haze_the_blue_first() {
+        let ratio = |visibility| {
+            let rgb = noon(visibility).0.mie.rgb();
+            rgb.z / rgb.x
+        };
+        let even = Spectrum::of(|_| 1.0).rgb();
+        assert!((ratio(500.0) / (even.z / even.x) - 1.0).abs() < 1e-4, "{}", ratio(500.0));
+        assert!(ratio(500.0) < ratio(2_000.0) && ratio(2_000.0) < ratio(10_000.0));
+        let clear = ratio(10_000.0);
+        assert!((ratio(100_000.0) / clear - 1.0).abs() < 1e-4, "clear days are as they were");
+    }
 
     fn noon(visibility: f64) -> (Atmosphere, Sun) {
         let sun = Sun::new(0.0, FRAC_PI_2 as f64);

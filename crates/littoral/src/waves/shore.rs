@@ -198,7 +198,8 @@ impl ShoreSea {
         let state = state.clone().checked()?;
         OutOfRange::unless((1..=1024).contains(&count), "waves over a bed", "from 1 to 1024", count as f64)?;
         let waves = state.band().map_or(Vec::new(), |(low, high)| components::drawn(&state, count, low, high));
-        ShoreSea::of_waves(bed, &waves, state.depth, &Settings::default(), &|_| true)
+        let settings = Settings { breaking: state.breaking as f32, ..Settings::default() };
+        ShoreSea::of_waves(bed, &waves, state.depth, &settings, &|_| true)
     }
 
     /// A sea of given waves, which come over water of a depth (m, infinity for deep), over a bed. `progress` is told now and then, from any

@@ -34,7 +34,7 @@ pub enum SpecError {
     Range(#[from] OutOfRange),
 }
 
-const KEYS: &str = "wind, from, fetch, model, gamma, hs, tp, spread, swell, depth, seed, beaufort, douglas";
+const KEYS: &str = "wind, from, fetch, model, gamma, hs, tp, spread, swell, depth, breaking, seed, beaufort, douglas";
 
 /// Fetch where none is told (m).
 const USUAL_FETCH: f64 = 300e3;
@@ -54,6 +54,7 @@ struct Fields {
     spread: Option<String>,
     swells: Vec<(f64, f64, f64)>,
     depth: Option<f64>,
+    breaking: Option<f64>,
     seed: Option<u64>,
     beaufort: Option<f64>,
     douglas: Option<f64>,
@@ -95,6 +96,7 @@ impl Fields {
             "hs" => self.hs = some("metres, from 0 to 100")?,
             "tp" => self.tp = some("seconds, above 0 and at most 100")?,
             "depth" => self.depth = some("a number of metres above 0")?,
+            "breaking" => self.breaking = some("a height over depth from 0.1 to 2")?,
             "beaufort" => self.beaufort = some("a number from 0 to 12")?,
             "douglas" => self.douglas = some("a degree from 0 to 9")?,
             "seed" => self.seed = Some(value.trim().parse().map_err(|_| wrong("a whole number, at least 0"))?),
@@ -160,6 +162,7 @@ impl Fields {
                 }
             }
         }
+        state.breaking = self.breaking.unwrap_or(state.breaking);
         state.seed = self.seed.unwrap_or(0);
         Ok(state.checked()?)
     }
@@ -238,6 +241,7 @@ mod tests {
         assert!((read("beaufort=8").significant_height() - 5.5).abs() < 1e-3);
         assert!((read("douglas=4,from=90").significant_height() - 1.875).abs() < 1e-3);
         assert!(read("wind=12,model=tma,depth=6").significant_height() < read("wind=12").significant_height());
+        assert_eq!((read("hs=2,tp=8").breaking, read("hs=2,tp=8,breaking=0.5").breaking), (0.78, 0.5));
         for line in ["wind=9,spread=mitsuyasu", "wind=9,spread=donelan-banner", "wind=9,spread=cos2s:20"] {
             assert_ne!(read(line), read("wind=9"), "{line}");
         }
@@ -264,6 +268,7 @@ mod tests {
         assert_eq!(error("wind=900"), "wind: expected m/s, above 0 and at most 120, got 900");
         assert_eq!(error("beaufort=13"), "beaufort: expected a number from 0 to 12, got 13");
         assert_eq!(error("depth=0,wind=5"), "depth: expected a number of metres above 0, got 0");
+        assert_eq!(error("wind=5,breaking=3"), "breaking: expected a height over depth from 0.1 to 2, got 3");
         assert_eq!(error("beaufort=3,douglas=4"), "`beaufort` and `douglas` cannot both be given; leave one out");
         assert_eq!(error("model=tma,wind=9"), "`model=tma` needs `depth=METRES`, too");
         assert!(error("storm").contains("expected `calm` or KEY=VALUE"));

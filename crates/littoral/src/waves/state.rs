@@ -21,6 +21,8 @@ pub struct SeaState {
     pub wind: Wind,
     /// Depth of the water where there is no bed (m, above 0); infinity for deep water.
     pub depth: f64,
+    /// Significant height over depth at which waves break over a bed, from 0.1 to 2: the width of the surf follows from it.
+    pub breaking: f64,
     /// Which of the seas of this state: the same seed gives the same bits everywhere.
     pub seed: u64,
 }
@@ -141,8 +143,13 @@ const DOUGLAS_HEIGHTS: [f64; 10] = [0.0, 0.05, 0.3, 0.875, 1.875, 3.25, 5.0, 7.5
 
 impl SeaState {
     /// No wind, no waves.
-    pub const CALM: SeaState =
-        SeaState { trains: Vec::new(), wind: Wind { speed: 0.0, heading: 0.0 }, depth: f64::INFINITY, seed: 0 };
+    pub const CALM: SeaState = SeaState {
+        trains: Vec::new(),
+        wind: Wind { speed: 0.0, heading: 0.0 },
+        depth: f64::INFINITY,
+        breaking: 0.78,
+        seed: 0,
+    };
 
     /// The sea that a wind (m/s at 10 m, towards `heading`) raises over a fetch (m): JONSWAP with Hasselmann's spreading.
     ///
@@ -219,10 +226,11 @@ impl SeaState {
     /// The same if all of its numbers make sense.
     ///
     /// # Errors
-    /// If the depth is not above 0, or a wind, direction or spectrum is not a number in range.
+    /// If the depth is not above 0, or breaking, a wind, direction or spectrum is not a number in range.
     pub fn checked(self) -> Result<SeaState, OutOfRange> {
         StillWater::of_depth(self.depth)?;
-        let wind = self.wind;
+        let (wind, breaking) = (self.wind, self.breaking);
+        OutOfRange::unless((0.1..=2.0).contains(&breaking), "breaking", "a height over depth from 0.1 to 2", breaking)?;
         OutOfRange::unless((0.0..=120.0).contains(&wind.speed), "wind", "m/s, from 0 to 120", wind.speed)?;
         OutOfRange::unless(wind.heading.is_finite(), "wind's heading", "a finite angle", wind.heading)?;
         for train in &self.trains {

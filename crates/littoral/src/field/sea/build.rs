@@ -54,7 +54,8 @@ impl Sea {
         }
         let split = 0.1 * CARRIED * high;
         let carried = components::drawn(&state, COMPONENTS, low, split);
-        let shore = ShoreSea::of_waves(&bed, &carried, state.depth, &Settings::default(), progress)?;
+        let settings = Settings { breaking: state.breaking as f32, ..Settings::default() };
+        let shore = ShoreSea::of_waves(&bed, &carried, state.depth, &settings, progress)?;
         let options = Options { lowest: state.water().wavenumber(TAU * split), ..Options::default() };
         let short = 4.0 * libm::sqrt(state.moment(0, split, 20.0 * high));
         let shelter = shelter(&bed, &shore, short)?;
