@@ -90,6 +90,17 @@ impl Scenery {
         problem.map_or(Ok(()), Err)
     }
 
+    /// Brings what a view needs of a picture that is too large to be on the device as a whole: a few pages at a time, so that the window does not wait for the lock.
+    pub fn bring_picture(&self, gpu: &Gpu, stage: &Stage<'_>, view: &View) {
+        /// Pages at a time.
+        const FEW: usize = 4;
+        let Some(full) = &self.full else { return };
+        let (_, changed) = full.lock().unwrap_or_else(PoisonError::into_inner).bring_picture(gpu, stage, view, FEW);
+        if changed {
+            self.changes.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
     /// Brings the sky as it is seen from a height (m), if it is another one. The lock is held while it is copied, not while it is made.
     pub fn see_from(&self, gpu: &Gpu, stage: &Stage<'_>, height: f64) {
         let Some(full) = &self.full else { return };

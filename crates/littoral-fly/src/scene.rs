@@ -387,6 +387,7 @@ fn fly(
                 {
                     voice.tell(News::Note(problem));
                 }
+                scenery.bring_picture(gpu, &stage, &wish.eye);
                 // A sky takes long: no more than a quarter of the time is spent on skies.
                 if sky.1.elapsed() > 3 * sky.0 {
                     let begun = Instant::now();
