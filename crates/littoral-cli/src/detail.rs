@@ -90,6 +90,7 @@ impl Drawer<'_> {
             if let Some(sea) = sea {
                 painter.follow_waves(sea);
             }
+            painter.set_objects(&stage.placed(sea)).map_err(unpainted)?;
             let told = |done| told(done);
             let painted = match &self.chooser {
                 Some(_) => painter.picture_of_made(stage, view, settings.samples, &told),

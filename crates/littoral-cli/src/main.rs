@@ -12,6 +12,7 @@ mod height;
 mod info;
 mod input;
 mod mesh;
+mod objects;
 mod plot;
 mod points;
 mod profile;

@@ -4,6 +4,7 @@ use crate::detail::{Detail, Drawer, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
+use crate::objects;
 use crate::subject::Subject;
 use crate::sun::SunChoice;
 use crate::talk::{Failure, Talk, progress, seconds, tidy};
@@ -14,6 +15,7 @@ use littoral::field::{Sea, coast};
 use littoral::picture::{self, Border, Climate, Display, Picture, Scene, Settings, Shot, Stage};
 use littoral::space::{Ray, View};
 use littoral::waves::SeaState;
+use littoral_data::ObjectOrder;
 use littoral_data::write::{self, Layer, PngPixels};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -38,6 +40,8 @@ use std::time::Instant;
   littoral render --sea beaufort=8,from=240                the coast in a storm
   littoral render --sea buoy=41010.data_spec               in the waves that a buoy measured
   littoral render dem.tif --lod quadtree --tolerance 2 --wireframe      the mesh that a method of detail draws
+  littoral render --object lighthouse@3690,1000            with a lighthouse on the headland
+  littoral render dem.tif --object boat.glb@562900,5109300,135    with a boat of your own that heads south-east
   littoral render --gpu                                    drawn by the graphics card, the same exact surface
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
@@ -98,6 +102,11 @@ pub struct Render {
     /// [default: calm; the built-in coast: beaufort=4,from=225]
     #[arg(long, value_name = "SPEC", help_heading = "Look")]
     sea: Option<String>,
+    /// A thing on the land or, where there is water, afloat: a glTF file (.glb, .gltf; metres, y up), or lighthouse or buoy, which are built
+    /// in; where it stands, as --eye counts; by how many degrees it is turned clockwise (0: what is -z in the file points north); and how many
+    /// times larger it is. Can be given many times. It casts no shadow yet, and is not mirrored in water
+    #[arg(long, value_name = "FILE@X,Y[,HEADING[,SCALE]]", help_heading = "Look")]
+    object: Vec<ObjectOrder>,
     /// The instant of the sea in seconds; of a film, that of its first frame
     #[arg(long, value_name = "S", value_parser = input::instant, default_value = "0", help_heading = "Look")]
     time: f64,
@@ -187,6 +196,9 @@ struct Answer {
     hs: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     time: Option<f64>,
+    /// How many objects there are, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    objects: Option<usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     passes: Option<String>,
     /// The mesh, if one was drawn.
@@ -201,6 +213,7 @@ impl Render {
         self.untangle()?;
         let out = self.output()?;
         let files = self.files.iter().map(PathBuf::as_path);
+        let files = files.chain(self.object.iter().map(|order| order.file.as_path()));
         let inputs: Vec<&Path> = files.chain(self.texture.as_deref()).chain(self.path.as_deref()).collect();
         check_output(&out.file, &inputs)?;
         if let Some(save) = &self.save_path {
@@ -217,8 +230,13 @@ impl Render {
             shot.shot.air.veils_distance = shot.border == Border::Mist || self.visibility.is_some();
         }
         let drape = self.texture.as_ref().map(|texture| subject.drape(texture, talk)).transpose()?;
+        let objects = objects::standing(&self.object, System::of(self.lonlat), &subject, talk)?;
+        if shot.style == picture::Style::Relief && !objects.is_empty() {
+            talk.warn("a shaded relief is a map: objects are not shown on it".to_owned());
+        }
         let scene = Scene {
             drape: drape.as_ref(),
+            objects: &objects,
             lakes: subject.lakes.as_ref(),
             climate: climate(&subject.frame),
             north: subject.frame.north(),
@@ -264,6 +282,7 @@ impl Render {
                 seed: self.seed,
                 hs: sea.as_ref().map(|_| state.clone().unwrap_or_else(coast::sea_state).significant_height()),
                 time: sea.as_ref().map(Sea::time),
+                objects: Some(objects.len()).filter(|&count| count > 0),
                 passes: passes.map(|p| p.display().to_string()),
                 mesh: chosen,
             });
@@ -309,13 +328,14 @@ impl Render {
             out: &out.file,
             folder: out.kind == Kind::Frames,
             look: format!(
-                "{:?} {:?} {:?} water {:?} sea {sea:?} time {}{}",
+                "{:?} {:?} {:?} water {:?} sea {sea:?} time {}{}{}",
                 shot.sun,
                 shot.air,
                 shot.style,
                 self.water,
                 self.time,
-                if self.detail.is_default() { String::new() } else { format!(" {:?}", self.detail) }
+                if self.detail.is_default() { String::new() } else { format!(" {:?}", self.detail) },
+                if self.object.is_empty() { String::new() } else { format!(" {:?}", self.object) }
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,

@@ -37,6 +37,7 @@ mod image;
 #[cfg(feature = "lod")]
 pub mod lod;
 mod mosaic;
+mod object;
 pub mod path;
 mod reduce;
 mod source;
@@ -53,6 +54,7 @@ pub use error::Error;
 pub use formats::tiles::{Code, Encoding};
 pub use georeference::{Georeference, Registration, metres_per_degree};
 pub use mosaic::{Mosaic, name_of_all, open_all};
+pub use object::{ObjectFile, ObjectOrder, object_from, open_object};
 pub use source::{
     Dem, Info, Level, LoadOptions, MemorySource, Source, VerticalDatum, load, load_from, load_window, open, open_as,
 };

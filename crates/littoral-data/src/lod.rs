@@ -6,7 +6,9 @@
 
 use glam::{DVec3, Vec3};
 use littoral::mesh::Model;
+use littoral::objects::{Form, Object, ObjectError, creased};
 use meshopt::SimplifyOptions;
+use std::collections::HashMap;
 
 /// How far a form may be reduced: until it has few enough triangles, or the error would grow too large.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +92,58 @@ pub fn lod_chain(model: &Model, reductions: &[Reduction]) -> Result<Vec<Lod>, Lo
     Ok(chain)
 }
 
+/// An object of one form in a chain of ever coarser ones: half as many triangles, a quarter and so on, as far as that makes it coarser. The coarser ones are smooth over edges that
+/// turn by less than 40°.
+///
+/// # Errors
+/// None, but for what would be wrong with an object.
+pub fn with_coarser_forms(object: Object) -> Result<Object, ObjectError> {
+    /// Fewer triangles are drawn at once as they are.
+    const FEW: usize = 24;
+    let full = &object.forms()[0];
+    // Simplification goes on over edges along which only normals differ, but not where colours do.
+    let (mut named, mut places) = (HashMap::new(), Vec::<(Vec3, Vec3)>::new());
+    let mut name = |corner: u32| {
+        let corner = &full.corners[corner as usize];
+        let key = [corner.position, corner.albedo].map(|v| v.to_array().map(|n| (n + 0.0).to_bits()));
+        *named.entry(key).or_insert_with(|| {
+            places.push((corner.position, corner.albedo));
+            places.len() as u32 - 1
+        })
+    };
+    let welded: Vec<[u32; 3]> = full.triangles.iter().map(|triangle| triangle.map(&mut name)).collect();
+    let positions: Vec<[f32; 3]> = places.iter().map(|place| place.0.to_array()).collect();
+    let mut forms = vec![full.clone()];
+    for halvings in 1..8 {
+        let before = &forms[forms.len() - 1];
+        let enough = full.triangles.len() >> halvings;
+        if enough < FEW {
+            break;
+        }
+        let mut error = 0f32;
+        let options = SimplifyOptions::ErrorAbsolute;
+        let left = meshopt::simplify_decoder(
+            welded.as_flattened(),
+            &positions,
+            3 * enough,
+            f32::MAX,
+            options,
+            Some(&mut error),
+        );
+        if 4 * left.len() / 3 > 3 * before.triangles.len() || left.is_empty() {
+            break; // hardly fewer
+        }
+        let error = error.max(before.error).max(f32::MIN_POSITIVE);
+        let (triangles, _) = left.as_chunks::<3>();
+        let form = creased(&places, triangles, 40f32.to_radians().cos());
+        if form.triangles.is_empty() || !error.is_finite() {
+            break;
+        }
+        forms.push(Form { error, ..form });
+    }
+    Object::new(forms)
+}
+
 /// Some triangles of a model with the vertices that they need.
 fn compact(model: &Model, triangles: &[[u32; 3]]) -> Model {
     let with_normals = model.normals.len() == model.positions.len();
@@ -113,6 +167,7 @@ fn compact(model: &Model, triangles: &[[u32; 3]]) -> Model {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use littoral::objects::Corner;
 
     /// A sphere of radius 10 about a place far from zero: an octahedron, each triangle parted in four again and again.
     fn sphere(times: usize) -> Model {
@@ -168,6 +223,31 @@ mod tests {
             }
         }
         assert!(chain.windows(2).all(|pair| pair[1].model.triangles.len() < pair[0].model.triangles.len()));
+    }
+
+    #[test]
+    fn an_object_gets_a_chain_of_forms_in_its_colours() {
+        let full = sphere(4);
+        let corner = |at: &DVec3| {
+            let place = (*at - DVec3::new(5e5, 5e6, 100.0)).as_vec3();
+            let albedo = if place.z > 0.0 { Vec3::new(0.6, 0.1, 0.1) } else { Vec3::splat(0.4) };
+            Corner { position: place, normal: place / 10.0, albedo }
+        };
+        let corners: Vec<Corner> = full.positions.iter().map(corner).collect();
+        let object = Object::new(vec![Form { corners, triangles: full.triangles, error: 0.0 }]).expect("a ball");
+        let chained = with_coarser_forms(object.clone()).expect("a chain");
+        assert_eq!(chained.forms()[0], object.forms()[0]);
+        assert!(chained.forms().len() >= 4, "{}", chained.forms().len());
+        for pair in chained.forms().windows(2) {
+            assert!(pair[1].triangles.len() * 4 <= pair[0].triangles.len() * 3 && pair[1].error >= pair[0].error);
+            for corner in &pair[1].corners {
+                assert!(corner.position.length() > 9.0 && corner.normal.dot(corner.position) > 6.0, "{corner:?}");
+                assert!(corner.albedo.x == if corner.position.z > 0.0 { 0.6 } else { 0.4 });
+            }
+        }
+        let few =
+            Object::new(vec![Form { triangles: vec![[0, 1, 2]], ..object.forms()[0].clone() }]).expect("a triangle");
+        assert_eq!(with_coarser_forms(few.clone()), Ok(few));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::settings::{Settings, Show, Split, Style};
 use glam::{Mat4, UVec2, Vec2};
 use littoral::field::{HeightField, Sea};
 use littoral::lod::Mesh;
-use littoral::picture::Stage;
+use littoral::picture::{Placed, Stage};
 use littoral::space::{Datum, View};
 use littoral_gpu::{Gpu, Ground, Look, ShapeTexture, Triangles, Waves};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -73,6 +73,13 @@ impl Scenery {
         }
     }
 
+    /// Draws these objects from now on. Where there are too many, those before stay; the sentence says why.
+    pub fn set_objects(&self, gpu: &Gpu, placed: &[Placed]) -> Result<(), String> {
+        let Some(full) = &self.full else { return Ok(()) };
+        self.changes.fetch_add(1, Ordering::Relaxed);
+        full.lock().unwrap_or_else(PoisonError::into_inner).set_objects(gpu, placed).map_err(|e| e.to_string())
+    }
+
     /// Makes the ground ready for rays. What cannot be is drawn as triangles; the sentence says why, once.
     pub fn bring_rays(&self, gpu: &Gpu, stage: &Stage<'_>) -> Result<(), String> {
         let mut problem = None;
@@ -81,6 +88,17 @@ impl Scenery {
             ShapeTexture::new(gpu, stage.land()).map_err(|e| problem = Some(format!("{e}; drawn as triangles"))).ok()
         });
         problem.map_or(Ok(()), Err)
+    }
+
+    /// Brings what a view needs of a picture that is too large to be on the device as a whole: a few pages at a time, so that the window does not wait for the lock.
+    pub fn bring_picture(&self, gpu: &Gpu, stage: &Stage<'_>, view: &View) {
+        /// Pages at a time.
+        const FEW: usize = 4;
+        let Some(full) = &self.full else { return };
+        let (_, changed) = full.lock().unwrap_or_else(PoisonError::into_inner).bring_picture(gpu, stage, view, FEW);
+        if changed {
+            self.changes.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// Brings the sky as it is seen from a height (m), if it is another one. The lock is held while it is copied, not while it is made.

@@ -35,6 +35,7 @@ use clap::Parser;
 use detail::Detail;
 use glam::UVec2;
 use littoral::lod::Method;
+use littoral_data::ObjectOrder;
 use settings::{Laid, Settings, Show, Split, Style};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -56,6 +57,7 @@ use std::process::ExitCode;
   littoral-fly --method roam --show both       a method of detail at work
   littoral-fly --method strips --against whole two methods, and how far apart their pictures are
   littoral-fly --sea beaufort=8,from=240 --mode boat
+  littoral-fly --object lighthouse@3030,1310   with a lighthouse on the rock
   littoral-fly dem.tif --texture ortho.tif     under a picture of the ground
   littoral-fly --smoke 200 --size 1280x720     fly 200 frames, print the medians as JSON
 
@@ -70,6 +72,10 @@ struct Arguments {
     /// Width and height of the window in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "1280x720")]
     size: UVec2,
+    /// A thing on the land or afloat: a glTF file, or lighthouse or buoy, which are built in; where it stands, in the coordinates of the height files;
+    /// how many degrees it is turned clockwise, and how many times larger it is. Can be given many times; natural pictures show it
+    #[arg(long, value_name = "FILE@X,Y[,HEADING[,SCALE]]")]
+    object: Vec<ObjectOrder>,
     /// A path to be flown at once
     #[arg(long, value_name = "FILE.toml")]
     path: Option<PathBuf>,

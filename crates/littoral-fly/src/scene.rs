@@ -331,6 +331,8 @@ fn fly(
             let mut answered: Option<Wish> = None;
             // Which waves natural pictures show: whether any, and of which instant (s).
             let mut seen = (false, f64::NAN);
+            // With which sea objects were placed: whether there was any, and its instant (s).
+            let mut placed: Option<(bool, f64)> = None;
             loop {
                 if draping.follow(wish.look.picture.as_deref(), subject) {
                     voice.working("opening the picture", 0.0);
@@ -385,6 +387,7 @@ fn fly(
                 {
                     voice.tell(News::Note(problem));
                 }
+                scenery.bring_picture(gpu, &stage, &wish.eye);
                 // A sky takes long: no more than a quarter of the time is spent on skies.
                 if sky.1.elapsed() > 3 * sky.0 {
                     let begun = Instant::now();
@@ -416,6 +419,13 @@ fn fly(
                     {
                         voice.tell(News::Note(problem));
                     }
+                    let tide = (waves.is_some(), waves.as_ref().map_or(0.0, Sea::time));
+                    if !subject.objects.is_empty() && placed != Some(tide) {
+                        if let Err(problem) = scenery.set_objects(gpu, &stage.placed(waves.as_ref())) {
+                            voice.tell(News::Note(problem));
+                        }
+                        placed = Some(tide);
+                    }
                     answered = Some(wish.clone());
                     match made {
                         Ok(frame) => {
@@ -442,6 +452,7 @@ fn scene<'a>(subject: &'a Subject, suits: &Shot, look: &Look, drape: Option<&'a 
     let climate = subject.lonlat().map_or_else(Climate::default, |lonlat| Climate::at_latitude(lonlat.y.to_radians()));
     Scene {
         lakes: subject.lakes.as_ref(),
+        objects: &subject.objects,
         sun: look.sun.unwrap_or(suits.sun),
         air,
         style: look.style,

@@ -3,11 +3,13 @@
 use glam::{DAffine2, DVec2, DVec3};
 use littoral::field::{Lakes, Land, Water, coast};
 use littoral::flight::FlightPath;
+use littoral::objects::{Footing, Standing};
 use littoral::picture::Drape;
 use littoral::space::{Ray, View};
 use littoral_data::path::{Coordinates, SavedPath};
-use littoral_data::{Crs, Georeference, LoadOptions, VerticalDatum};
+use littoral_data::{Crs, Georeference, LoadOptions, ObjectOrder, VerticalDatum};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What is to be opened.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,6 +18,8 @@ pub struct Order {
     pub files: Vec<PathBuf>,
     /// By how much heights are stretched.
     pub exaggeration: f64,
+    /// What is to stand on it.
+    pub objects: Vec<ObjectOrder>,
 }
 
 /// Land and all that belongs to it. It does not change: whoever needs it shares it.
@@ -31,6 +35,8 @@ pub struct Subject {
     pub water: Option<Water>,
     /// The lakes.
     pub lakes: Option<Lakes>,
+    /// What stands on them.
+    pub objects: Vec<Standing>,
     /// What heights are counted from, in words.
     pub datum: String,
     /// What its readers noticed.
@@ -101,7 +107,54 @@ impl Subject {
         let water = Water::flood(&land, 0.0);
         let lakes = Lakes::find(&land, water.as_ref());
         let crs_from_local = georeference.as_ref().map_or(DAffine2::IDENTITY, Georeference::crs_from_local);
-        Ok(Subject { order: order.clone(), name, land, water, lakes, datum, notes, georeference, crs_from_local })
+        let mut subject = Subject {
+            order: order.clone(),
+            name,
+            land,
+            water,
+            lakes,
+            objects: Vec::new(),
+            datum,
+            notes,
+            georeference,
+            crs_from_local,
+        };
+        subject.place_objects(told);
+        Ok(subject)
+    }
+
+    /// Opens the objects that are ordered, each file once. What cannot stand is left out; a note says why.
+    fn place_objects(&mut self, told: &dyn Fn(&str, f32)) {
+        let local_from_crs = self.crs_from_local.inverse();
+        let mut opened = Vec::new();
+        for order in self.order.objects.clone() {
+            told("opening objects", self.objects.len() as f32 / self.order.objects.len() as f32);
+            let file = order.file.display();
+            if !opened.iter().any(|(known, _)| *known == order.file) {
+                match order.open() {
+                    Ok(read) => {
+                        self.notes.extend(read.warnings.iter().map(|warning| format!("{file}: {warning}")));
+                        opened.push((order.file.clone(), Arc::new(read.object)));
+                    }
+                    Err(problem) => self.notes.push(problem.to_string()),
+                }
+            }
+            let Some((_, object)) = opened.iter().find(|(known, _)| *known == order.file) else { continue };
+            let near = self.georeference.as_ref().map_or(order.at, |georeference| georeference.near(order.at));
+            let standing = Standing {
+                object: object.clone(),
+                place: local_from_crs.transform_point2(near),
+                heading: order.heading_degrees.to_radians() + self.north(),
+                scale: order.scale,
+                footing: Footing::Surface,
+            };
+            match standing.pose(&self.land, self.water.as_ref(), None) {
+                Some(_) => self.objects.push(standing),
+                None => self
+                    .notes
+                    .push(format!("{file}: neither ground nor water at {},{}; move it", order.at.x, order.at.y)),
+            }
+        }
     }
 
     /// A picture as it lies over this land, and what was noticed.

@@ -1,8 +1,11 @@
 //! What the ground is seen as, on the device: nothing but nature, tints by height, a picture laid over it, or a shaded relief.
 
+mod pages;
+
 use crate::Gpu;
 use glam::{DAffine2, DVec2, UVec2, Vec3};
 use littoral::picture::{Coat, Texture};
+use pages::Pages;
 use wgpu::{TextureDimension, TextureFormat};
 
 /// A coat.
@@ -16,33 +19,59 @@ pub(crate) struct GpuCoat {
     pub lake: Vec3,
     /// From the land's coordinates (m) to the picture's.
     pub uv_from_local: DAffine2,
+    /// Of a picture that is too large to be there as a whole.
+    pub pages: Option<Pages>,
 }
 
+/// Bytes that a picture may take of the device.
+pub(crate) const PICTURE_BYTES: u64 = 256 << 20;
+
 impl GpuCoat {
-    /// Brings a coat to the device, with its texture: colours of tints, land in the first row and bed in the second; or the picture, with its means. Of a picture larger
-    /// than the device's textures the finest mean that fits is taken.
-    pub fn new(gpu: &Gpu, coat: &Coat) -> (GpuCoat, wgpu::Texture) {
-        let plain =
-            GpuCoat { kind: 0.0, tint: [0.0, 0.0, 1.0, 1.0], lake: Vec3::ZERO, uv_from_local: DAffine2::IDENTITY };
+    /// Brings a coat to the device, with its texture and its table of pages: colours of tints, land in the first row and bed in the second; or the picture, with its means. A picture of more than so many
+    /// bytes, or larger than the device's textures, comes by pages: [`Pages::bring`] is then due for each view.
+    pub fn new(gpu: &Gpu, coat: &Coat, picture_bytes: u64) -> (GpuCoat, wgpu::Texture, wgpu::Buffer) {
+        let plain = GpuCoat {
+            kind: 0.0,
+            tint: [0.0, 0.0, 1.0, 1.0],
+            lake: Vec3::ZERO,
+            uv_from_local: DAffine2::IDENTITY,
+            pages: None,
+        };
+        let no_pages = || {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("no pages"),
+                size: 32,
+                usage: wgpu::BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            })
+        };
         let make = |format, size: [u32; 2], bytes: &[u8]| {
             crate::scenery::texture(gpu, "coat", format, [size[0], size[1], 1], TextureDimension::D2, bytes)
         };
         let nothing = || make(TextureFormat::Rgba8Unorm, [1, 1], &[0; 4]);
         match coat {
-            Coat::Natural => (plain, nothing()),
+            Coat::Natural => (plain, nothing(), no_pages()),
             Coat::Tint { land, bed, lake, heights: [low, foot, high], steepening } => {
                 let colours = land.iter().chain(bed).map(|&colour| (colour, 0.0));
                 let halves = crate::scenery::halves(colours);
                 let texture = make(TextureFormat::Rgba16Float, [land.len() as u32, 2], bytemuck::cast_slice(&halves));
                 let tint = [*low, *foot, *high, *steepening];
-                (GpuCoat { kind: 1.0, tint, lake: *lake, ..plain }, texture)
+                (GpuCoat { kind: 1.0, tint, lake: *lake, ..plain }, texture, no_pages())
             }
             Coat::Relief { lake, heights: [low, foot, high], steepening } => {
                 let tint = [*low, *foot, *high, *steepening];
-                (GpuCoat { kind: 3.0, tint, lake: *lake, ..plain }, nothing())
+                (GpuCoat { kind: 3.0, tint, lake: *lake, ..plain }, nothing(), no_pages())
             }
             Coat::Image(drape) => {
-                (GpuCoat { kind: 2.0, uv_from_local: drape.uv_from_local, ..plain }, picture(gpu, &drape.texture))
+                let image = GpuCoat { kind: 2.0, uv_from_local: drape.uv_from_local, ..plain };
+                let size = drape.texture.size();
+                let bytes = 4 * u64::from(size.x) * u64::from(size.y) * 4 / 3;
+                if bytes <= picture_bytes && size.max_element() <= gpu.device.limits().max_texture_dimension_2d {
+                    return (image, picture(gpu, &drape.texture), no_pages());
+                }
+                let pages = Pages::new(gpu, &drape.texture, picture_bytes);
+                let (atlas, table) = (pages.atlas.clone(), pages.table.clone());
+                (GpuCoat { pages: Some(pages), ..image }, atlas, table)
             }
         }
     }
@@ -60,16 +89,14 @@ impl GpuCoat {
     }
 }
 
-/// A picture with its means, as far as they fit.
+/// A picture with its means.
 fn picture(gpu: &Gpu, texture: &Texture) -> wgpu::Texture {
-    let most = gpu.device.limits().max_texture_dimension_2d;
-    let levels: Vec<(UVec2, &[[f32; 3]])> =
-        texture.levels().skip_while(|(size, _)| size.max_element() > most).collect();
-    let size = levels.first().map_or(UVec2::ONE, |level| level.0);
+    let levels: Vec<(UVec2, &[[f32; 3]])> = texture.levels().collect();
+    let size = texture.size();
     let made = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("drape"),
         size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-        mip_level_count: levels.len().max(1) as u32,
+        mip_level_count: levels.len() as u32,
         sample_count: 1,
         dimension: TextureDimension::D2,
         format: TextureFormat::Rgba8UnormSrgb,

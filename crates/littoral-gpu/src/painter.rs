@@ -1,9 +1,11 @@
 //! Pictures without a window.
 
 use crate::bisector::Bisector;
+use crate::coat::PICTURE_BYTES;
 use crate::device::{Gpu, GpuError};
 use crate::expander::Expander;
 use crate::frame::Look;
+use crate::objects::TooManyObjects;
 use crate::rays::{ShapeError, ShapeTexture};
 use crate::renderer::{Ground, Renderer};
 use crate::scenery::{Scenery, TooLarge};
@@ -13,7 +15,7 @@ use crate::waves::{Waves, WavesError};
 use glam::{UVec2, Vec2};
 use littoral::field::{HeightField, Land, Sea};
 use littoral::lod::{Drawing, Limits, Mesh, NestedBounds, ViewError};
-use littoral::picture::{Medium, Picture, Stage};
+use littoral::picture::{Medium, Picture, Placed, Stage};
 use littoral::space::{Datum, View};
 
 /// Paints what views see of a stage, as [`Stage::render_meshes`] does.
@@ -89,6 +91,9 @@ pub enum PainterError {
     /// Waves that it does not draw.
     #[error(transparent)]
     Waves(#[from] WavesError),
+    /// Too many objects, or too large ones.
+    #[error(transparent)]
+    Objects(#[from] TooManyObjects),
     /// Something that it does not draw.
     #[error("expected land on a plane, got {got}: the GPU does not draw that yet; draw it on the processor")]
     Unknown {
@@ -103,12 +108,21 @@ impl Painter {
     /// # Errors
     /// If the stage stands on an ellipsoid, or is larger than the device's textures.
     pub fn new(gpu: Gpu, stage: &Stage) -> Result<Painter, PainterError> {
+        Painter::with_picture_bytes(gpu, stage, PICTURE_BYTES)
+    }
+
+    /// The same where a picture that is laid over the land may take so many bytes of the device (usually 256 MiB): see [`Scenery::with_picture_bytes`].
+    ///
+    /// # Errors
+    /// As [`Painter::new`].
+    pub fn with_picture_bytes(gpu: Gpu, stage: &Stage, bytes: u64) -> Result<Painter, PainterError> {
         let Datum::Plane { origin, size } = stage.land().datum() else {
             return Err(PainterError::Unknown { got: "an ellipsoid" });
         };
         let tables = stage.tables();
         let height = f64::from(stage.land().height_range().high).max(2.0);
-        let scenery = Scenery::new(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)))?;
+        let scenery =
+            Scenery::with_picture_bytes(&gpu, &tables, (origin, size), (height, &stage.sky_table(height)), bytes)?;
         let renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
         gpu.check()?;
         Ok(Painter {
@@ -138,6 +152,20 @@ impl Painter {
     /// Goes on to the instant at which the sea of [`Painter::set_waves`] stands now.
     pub fn follow_waves(&mut self, sea: &Sea) {
         self.scenery.follow_waves(&self.gpu, sea);
+    }
+
+    /// Draws these objects from here on, in place of those before: [`Stage::placed`].
+    ///
+    /// # Errors
+    /// If they do not fit into the device's buffers, or the device was lost.
+    pub fn set_objects(&mut self, placed: &[Placed]) -> Result<(), PainterError> {
+        self.scenery.set_objects(&self.gpu, placed)?;
+        Ok(self.gpu.check()?)
+    }
+
+    /// How many triangles of objects the last picture took, each time that it looked.
+    pub fn object_triangles(&self) -> u64 {
+        self.renderer.object_triangles()
     }
 
     /// What paints.
@@ -246,6 +274,7 @@ impl Painter {
         if self.scenery.wants_sky(view.eye.z) {
             self.scenery.set_sky(gpu, view.eye.z, &stage.sky_table(view.eye.z));
         }
+        self.scenery.bring_picture(gpu, stage, view, usize::MAX);
         let ground = match source {
             Source::Mesh(mesh) => {
                 self.triangles.set(gpu, mesh)?;

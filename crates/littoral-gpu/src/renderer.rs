@@ -3,6 +3,7 @@
 use crate::bindings;
 use crate::device::{Gpu, GpuError};
 use crate::frame::{self, Look, Uniforms};
+use crate::objects::{OBJECT_SHADER, ObjectPass};
 use crate::rays::ShapeTexture;
 use crate::scenery::{self, Scenery};
 use crate::triangles::Triangles;
@@ -13,7 +14,7 @@ use littoral::picture::Medium;
 use littoral::space::View;
 
 /// Every shader with its name, as it is compiled: for tests that need no device.
-pub const SHADERS: [(&str, &str); 4] = [
+pub const SHADERS: [(&str, &str); 5] = [
     ("surface", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/surface.wgsl"))),
     (
         "shade",
@@ -31,11 +32,12 @@ pub const SHADERS: [(&str, &str); 4] = [
     ),
     ("display", include_str!("shaders/display.wgsl")),
     ("wires", concat!(include_str!("shaders/frame.wgsl"), include_str!("shaders/wires.wgsl"))),
+    OBJECT_SHADER,
 ];
 
 pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Radiance (kcd/m²), and the distance of what is seen (m), 0 for the sky.
-const RADIANCE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+pub(crate) const RADIANCE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
 /// What tells how far away the ground is.
 #[derive(Clone, Copy, Debug)]
@@ -81,13 +83,14 @@ pub struct Renderer {
     canvas: Option<Canvas>,
     /// Made when the first waves are drawn.
     waves: Option<WavePass>,
+    objects: ObjectPass,
 }
 
 impl Renderer {
     /// A renderer that draws to targets of a format: 8 bits a channel, encoded as sRGB by the format or not.
     pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Renderer {
         let device = &gpu.device;
-        let [surface, shade, display, wires] = SHADERS.map(|(label, source)| {
+        let [surface, shade, display, wires, objects] = SHADERS.map(|(label, source)| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(label),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -203,6 +206,7 @@ impl Renderer {
             shown: uniform("shown", 32),
             canvas: None,
             waves: None,
+            objects: ObjectPass::new(gpu, &objects),
         }
     }
 
@@ -271,6 +275,13 @@ impl Renderer {
             pass.set_bind_group(number, group, &[]);
         }
         pass.draw(0..3, 0..1);
+        drop(pass);
+        self.objects.draw(gpu, encoder, (&self.frame, view), scenery, &canvas.radiance, &canvas.depth);
+    }
+
+    /// How many triangles of objects were drawn last.
+    pub fn object_triangles(&self) -> u64 {
+        self.objects.triangles
     }
 
     /// Records triangles, as far away as they are.
@@ -464,7 +475,7 @@ pub(crate) fn drawable(
 }
 
 /// A colour attachment that keeps what is drawn.
-fn onto(view: &wgpu::TextureView, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPassColorAttachment<'_> {
+pub(crate) fn onto(view: &wgpu::TextureView, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPassColorAttachment<'_> {
     wgpu::RenderPassColorAttachment {
         view,
         depth_slice: None,

@@ -1,14 +1,16 @@
 //! A scene made ready for the GPU: the engine's tables as textures.
 
 use crate::bindings;
-use crate::coat::GpuCoat;
+use crate::coat::{GpuCoat, PICTURE_BYTES};
 use crate::device::Gpu;
 use crate::frame::LEVELS;
+use crate::objects::{Objects, TooManyObjects};
 use crate::waves::Waves;
 use glam::{DVec2, UVec2, Vec3};
 use half::f16;
-use littoral::field::Sea;
-use littoral::picture::{Lattice, Medium, SkyTable, Slab, Tables};
+use littoral::field::{HeightField, Sea};
+use littoral::picture::{Lattice, Medium, Placed, SkyTable, Slab, Stage, Tables};
+use littoral::space::View;
 use wgpu::util::{DeviceExt, TextureDataOrder};
 use wgpu::{TextureDimension, TextureFormat};
 
@@ -24,6 +26,7 @@ pub struct Scenery {
     pub(crate) coat: GpuCoat,
     pub(crate) medium: Medium,
     pub(crate) waves: Option<Waves>,
+    pub(crate) objects: Objects,
     /// Of the lattice that meshes' vertices are on (m), and metres a step.
     pub(crate) origin: DVec2,
     pub(crate) step: DVec2,
@@ -83,6 +86,21 @@ impl Scenery {
     /// # Errors
     /// If the raster is larger than textures can be.
     pub fn new(gpu: &Gpu, tables: &Tables, datum: (DVec2, DVec2), sky: (f64, &SkyTable)) -> Result<Scenery, TooLarge> {
+        Scenery::with_picture_bytes(gpu, tables, datum, sky, PICTURE_BYTES)
+    }
+
+    /// The same where a picture that is laid over the land may take so many bytes of the device (usually 256 MiB); of a larger one there are only the pages of
+    /// [`Scenery::bring_picture`].
+    ///
+    /// # Errors
+    /// As [`Scenery::new`].
+    pub fn with_picture_bytes(
+        gpu: &Gpu,
+        tables: &Tables,
+        datum: (DVec2, DVec2),
+        sky: (f64, &SkyTable),
+        picture_bytes: u64,
+    ) -> Result<Scenery, TooLarge> {
         let finest = &tables.heights[0];
         let most = gpu.device.limits().max_texture_dimension_2d;
         let (columns, rows) = (finest.columns, finest.rows);
@@ -151,7 +169,7 @@ impl Scenery {
         let nothing = vec![0; (distances * elevations * 8) as usize];
         let eye_through = make("air before the eye", half, [distances, elevations, 1], &nothing);
         let points = [tables.skylight.columns as u32, tables.skylight.rows as u32, 9];
-        let (coat, coat_map) = GpuCoat::new(gpu, &tables.coat);
+        let (coat, coat_map, pages) = GpuCoat::new(gpu, &tables.coat, picture_bytes);
         let textures = [
             &floats("heights", &finest.values, map),
             &floats("coarse heights", &atlas, [size.x, size.y, 1]),
@@ -168,13 +186,14 @@ impl Scenery {
         ];
         write_light(gpu, &land_light, &tables.land_sky);
         let mut scenery = Scenery {
-            group: group(&gpu.device, textures),
+            group: group(&gpu.device, textures, &pages),
             eye_light,
             eye_through,
             still: crate::waves::run_up(gpu, [1, 1], &[0.0]),
             coat,
             medium: tables.medium,
             waves: None,
+            objects: Objects::default(),
             origin: datum.0,
             step: datum.1 / (1u64 << 30) as f64,
             map_origin: finest.origin,
@@ -227,6 +246,18 @@ impl Scenery {
         self.sky_height = height;
     }
 
+    /// Brings what a view needs of the picture that is laid over the land, that of the stage, if it is too large to be there as a whole: no more than `most` pages of 256 × 256 texels
+    /// that are not there yet, the coarsest first. What is not there is seen in coarser ones. Whether all is there, and whether anything has changed.
+    pub fn bring_picture(&mut self, gpu: &Gpu, stage: &Stage, view: &View, most: usize) -> (bool, bool) {
+        let range = stage.land().height_range();
+        match (&mut self.coat.pages, stage.drape()) {
+            (Some(pages), Some(drape)) => {
+                pages.bring(gpu, drape, (stage.land().datum(), [range.low, range.high]), view, most)
+            }
+            _ => (true, false),
+        }
+    }
+
     /// Whether there is water that waves can be drawn on: on maps it is a colour.
     pub fn shows_waves(&self) -> bool {
         self.level.is_some() && !self.coat.is_map()
@@ -244,13 +275,21 @@ impl Scenery {
         }
     }
 
+    /// Draws these objects from here on, in place of those before: [`Stage::placed`].
+    ///
+    /// # Errors
+    /// If they do not fit into the device's buffers; then nothing changes.
+    pub fn set_objects(&mut self, gpu: &Gpu, placed: &[Placed]) -> Result<(), TooManyObjects> {
+        self.objects.set(gpu, placed)
+    }
+
     /// How high swash reaches: what the pass that shades is bound to.
     pub(crate) fn run_up(&self) -> &wgpu::BindGroup {
         self.waves.as_ref().map_or(&self.still, |waves| &waves.run_up.0)
     }
 }
 
-/// The layout of a scenery's group: its textures, in the order in which [`Scenery::new`] names them, and a sampler that reads between texels.
+/// The layout of a scenery's group: its textures, in the order in which [`Scenery::new`] names them, a sampler that reads between texels, and the pages of a picture.
 pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     use wgpu::TextureViewDimension::{D2, D2Array, D3};
     let (texels, smooth) = (bindings::texels(D2), bindings::smooth(D2));
@@ -268,11 +307,12 @@ pub(crate) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         texels,
         texels,
         wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+        bindings::storage(true),
     ];
     bindings::group_layout(device, "scenery", wgpu::ShaderStages::FRAGMENT, &types)
 }
 
-fn group(device: &wgpu::Device, textures: [&wgpu::Texture; 12]) -> wgpu::BindGroup {
+fn group(device: &wgpu::Device, textures: [&wgpu::Texture; 12], pages: &wgpu::Buffer) -> wgpu::BindGroup {
     let views = textures.map(|texture| texture.create_view(&Default::default()));
     let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
         label: Some("smooth"),
@@ -282,7 +322,8 @@ fn group(device: &wgpu::Device, textures: [&wgpu::Texture; 12]) -> wgpu::BindGro
         ..Default::default()
     });
     let views = views.iter().map(wgpu::BindingResource::TextureView);
-    bindings::group(device, "scenery", &layout(device), views.chain([wgpu::BindingResource::Sampler(&sampler)]))
+    let others = [wgpu::BindingResource::Sampler(&sampler), pages.as_entire_binding()];
+    bindings::group(device, "scenery", &layout(device), views.chain(others))
 }
 
 /// Light of the sky: azimuths are slices, one after the other for each kind of scattering.

@@ -320,3 +320,32 @@ fn passes_that_were_recorded_are_timed() {
     // The same view of the same instant: sums and points stand.
     assert_eq!(draw(&scenery, false), ["surface", "waves", "shade"]);
 }
+
+#[test]
+fn pages_of_pictures_of_every_size_are_brought() {
+    let gpu = gpu();
+    let land = bay(65, 49, false);
+    let shape = ShapeTexture::new(&gpu, &land).expect("a small land");
+    let mut renderer = Renderer::new(&gpu, wgpu::TextureFormat::Rgba8Unorm);
+    for size in [UVec2::ONE, UVec2::new(300, 170), UVec2::new(9000, 3), UVec2::new(2, 8193)] {
+        let texture = Texture::from_srgb(size, &vec![[90, 120, 60]; size.element_product() as usize]);
+        let drape = Drape { texture, uv_from_local: DAffine2::from_scale(1.0 / land.extent()) };
+        let stage = Stage::new(&Scene { style: Style::Image, drape: Some(&drape), ..Scene::new(&land, None) });
+        let Datum::Plane { origin, size: extent } = land.datum() else { panic!("a plane") };
+        for bytes in [0, 300_000, 1 << 30] {
+            let sky = (100.0, &stage.sky_table(100.0));
+            let scenery = Scenery::with_picture_bytes(&gpu, &stage.tables(), (origin, extent), sky, bytes);
+            let mut scenery = scenery.expect("a small land");
+            for (pixels, most) in [(UVec2::ONE, 0), (UVec2::ZERO, 3), (UVec2::new(64, 36), 1), (UVec2::new(64, 36), 99)]
+            {
+                let view = view(&land, pixels);
+                scenery.bring_picture(&gpu, &stage, &view, most);
+                let mut encoder = gpu.device.create_command_encoder(&Default::default());
+                let ground = Ground::Rays { shape: &shape, pixels: 0.0 };
+                renderer.draw(&gpu, &mut encoder, &scenery, ground, &view, Look::default());
+                gpu.queue.submit([encoder.finish()]);
+                sound(&gpu, format!("{size} within {bytes} bytes, {most} pages for {pixels}"));
+            }
+        }
+    }
+}

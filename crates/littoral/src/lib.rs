@@ -13,7 +13,8 @@
 //! 4. [`picture`]: pictures without a GPU.
 //! 5. [`lod`]: triangles that follow the eye.
 //! 6. [`mesh`]: meshes of a whole raster within a bound of error.
-//! 7. [`flight`]: paths through the air.
+//! 7. [`objects`]: what stands on the land and floats on the sea.
+//! 8. [`flight`]: paths through the air.
 //!
 //! Conventions: right-handed coordinates, x east, y north, z up; metres, seconds and radians unless a name says
 //! otherwise; `f64` says where, `f32` says how far from the eye, integers say which.
@@ -23,6 +24,7 @@ pub mod flight;
 pub mod lod;
 pub mod memory;
 pub mod mesh;
+pub mod objects;
 pub mod picture;
 pub mod raycast;
 pub mod space;

@@ -8,6 +8,7 @@ mod exr;
 mod film;
 mod geotiff;
 mod mesh;
+mod object;
 mod png;
 
 pub use self::exr::{Layer, exr};
@@ -15,6 +16,7 @@ pub use self::png::{PngPixels, png};
 pub use film::{Film, FilmSettings, FrameFolder, ffmpeg_installed};
 pub use geotiff::{GeoTags, GridSamples, geotiff};
 pub use mesh::{MeshFormat, mesh};
+pub use object::object;
 
 use crate::Error;
 use std::io::{BufWriter, Seek, Write};

@@ -121,3 +121,16 @@ fn irradiance_open(normal: vec3f) -> vec3f {
     }
     return max(sum, vec3f(0.0));
 }
+
+// Light as it arrives at the eye, and from how far.
+fn through_air(direction: vec3f, rel: vec3f, distance: f32, light: vec3f) -> vec4f {
+    if frame.disc.w == 0.0 {
+        return vec4f(light, distance);
+    }
+    var through = distance;
+    if frame.eye.z > frame.climate.z {
+        through = min(through, (frame.climate.z - (frame.eye.z + rel.z)) / max(-direction.z, 1e-3));
+    }
+    let air = veil(direction, through);
+    return vec4f(light * air.through + air.light, distance);
+}

@@ -2,6 +2,9 @@
 
 // Colours of tints, land and bed; or the picture. Nothing of a shaded relief.
 @group(1) @binding(3) var coat_map: texture_2d<f32>;
+// Of a picture of which only pages are there: how many levels it has and pages along a side of the atlas that the map then is; of each level texels, columns of pages, and where
+// in the table they begin; and of each page its place. No level where the whole picture is there.
+@group(1) @binding(13) var<storage, read> pages: array<u32>;
 
 fn is_map() -> bool {
     return frame.coat.x == 1.0 || is_paper();
@@ -36,10 +39,42 @@ fn picture_at(rel: vec2f, footprint: f32) -> vec3f {
     if any(uv < vec2f(0.0)) || any(uv > vec2f(1.0)) {
         return vec3f(0.25);
     }
-    let size = vec2f(textureDimensions(coat_map));
+    var size = vec2f(textureDimensions(coat_map));
+    if pages[0] > 0u {
+        size = vec2f(f32(pages[4]), f32(pages[5]));
+    }
     let texels = footprint * sqrt(length(frame.drape.xy * size) * length(frame.drape.zw * size));
+    let level = log2(max(texels, 1.0));
     // Cameras' pictures hold light, not albedo: what is white in them reflects about 0.6.
-    return 0.6 * textureSampleLevel(coat_map, smooth_sampler, uv, log2(max(texels, 1.0))).rgb;
+    if pages[0] == 0u {
+        return 0.6 * textureSampleLevel(coat_map, smooth_sampler, uv, level).rgb;
+    }
+    let finer = u32(level);
+    return 0.6 * mix(paged(uv, finer), paged(uv, finer + 1u), fract(level));
+}
+
+// Texels of a page along a side, all and without those at its border that are the next page's.
+const PAGE = 256.0;
+const INNER = 254.0;
+const ABSENT = 0xffffffffu;
+
+// The picture on a level, or on the next coarser one that is there; the coarsest always is.
+fn paged(uv: vec2f, level: u32) -> vec3f {
+    var found = vec3f(0.25);
+    for (var i = min(level, pages[0] - 1u); i < pages[0]; i++) {
+        let head = 4u * (i + 1u);
+        let size = vec2f(f32(pages[head]), f32(pages[head + 1u]));
+        let texel = uv * size;
+        let page = min(floor(texel / INNER), ceil(size / INNER) - 1.0);
+        let place = pages[pages[head + 3u] + u32(page.y) * pages[head + 2u] + u32(page.x)];
+        if place != ABSENT {
+            let corner = vec2f(f32(place % pages[1]), f32(place / pages[1])) * PAGE;
+            let at = corner + 1.0 + (texel - page * INNER);
+            found = textureSampleLevel(coat_map, smooth_sampler, at / (PAGE * f32(pages[1])), 0.0).rgb;
+            break;
+        }
+    }
+    return found;
 }
 
 // Even ground of an albedo, its slopes steepened for the light.

@@ -330,19 +330,6 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
     return through_air(direction, rel, distance, light);
 }
 
-// Light as it arrives at the eye, and from how far.
-fn through_air(direction: vec3f, rel: vec3f, distance: f32, light: vec3f) -> vec4f {
-    if frame.disc.w == 0.0 {
-        return vec4f(light, distance);
-    }
-    var through = distance;
-    if frame.eye.z > frame.climate.z {
-        through = min(through, (frame.climate.z - (frame.eye.z + rel.z)) / max(-direction.z, 1e-3));
-    }
-    let air = veil(direction, through);
-    return vec4f(light * air.through + air.light, distance);
-}
-
 // What fresh foam throws back (C. Whitlock, D. Bartlett, E. Gurganus 1982, beyond the blue).
 const FOAM = vec3f(0.58, 0.60, 0.62);
 

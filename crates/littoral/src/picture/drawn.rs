@@ -8,7 +8,7 @@
 //! Everything else (light, shadows, mirrors, air) is that of the exact surface: a picture of a mesh differs from the exact one by the mesh alone.
 
 use super::stage::{Caster, Stage};
-use super::{Picture, Settings};
+use super::{Drape, Picture, Settings, Style};
 use crate::field::{HeightField, Land, Sea};
 use crate::lod::Mesh;
 use crate::raycast::{LocalRay, RayCaster};
@@ -69,12 +69,16 @@ impl Facet {
 impl Drawn {
     /// Sorts a mesh on `datum` into the tiles of a view's picture.
     pub fn new(mesh: &Mesh, datum: &Datum, view: &View) -> Drawn {
-        let vertices: Vec<DVec3> = mesh
+        let vertices = mesh
             .vertices
             .par_iter()
             .map(|v| if v.height.is_nan() { DVec3::ZERO } else { v.world(datum) - view.eye })
             .collect();
-        let triangles = mesh.triangles.clone();
+        Drawn::of(vertices, mesh.triangles.clone(), view)
+    }
+
+    /// Sorts triangles over vertices, these from the eye (m), into the tiles of a view's picture.
+    pub fn of(vertices: Vec<DVec3>, triangles: Vec<[u32; 3]>, view: &View) -> Drawn {
         let last = view.size.saturating_sub(UVec2::ONE);
         let cover = |triangle: &[u32; 3]| cover(view, triangle.map(|i| vertices[i as usize]), last);
         let boxes: Vec<[u32; 4]> = triangles.par_iter().map(cover).collect();
@@ -104,8 +108,19 @@ impl Drawn {
         Facet::new(self.triangles[triangle as usize].map(|i| self.vertices[i as usize]))
     }
 
+    /// Whether a triangle's corners run counter-clockwise as the eye sees them.
+    pub fn faces(&self, triangle: u32) -> bool {
+        self.facet(triangle).volume < 0.0
+    }
+
+    /// The vertices of a triangle, and the share that each has of it where a ray from the eye meets it.
+    pub fn shares(&self, triangle: u32, direction: Vec3) -> ([u32; 3], [f32; 3]) {
+        let [c, a, b] = self.facet(triangle).sides.map(|side| direction.as_dvec3().dot(side));
+        (self.triangles[triangle as usize], [a, b, c].map(|share| (share / (a + b + c)) as f32))
+    }
+
     /// For rays from the eye: distance (m) to the first triangle, infinity for none, and which it is.
-    fn hits(&self, directions: &[Vec3], mut found: impl FnMut(usize, f32, u32)) {
+    pub fn hits(&self, directions: &[Vec3], mut found: impl FnMut(usize, f32, u32)) {
         // Rays sorted by the pixel they go through.
         let pixel = |direction: Vec3| {
             let clip = self.view.clip_from_eye * direction.extend(1.0);
@@ -303,6 +318,11 @@ impl Stage<'_> {
     /// shown as mist, or a side of the block.
     pub fn land(&self) -> &Land {
         &self.ground.land
+    }
+
+    /// The picture that the ground is seen as, if it is.
+    pub fn drape(&self) -> Option<&Drape> {
+        self.scene.drape.filter(|_| self.scene.style == Style::Image)
     }
 
     /// What `view` sees when meshes stand for the surfaces they are of. Shadows and mirrors stay those of the exact ground.

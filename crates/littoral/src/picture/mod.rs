@@ -35,6 +35,7 @@ mod spectrum;
 mod stage;
 mod tables;
 mod texture;
+mod things;
 mod tile;
 mod waves;
 
@@ -46,8 +47,10 @@ pub use sea::Streaks;
 pub use stage::Stage;
 pub use tables::{Coat, Lattice, SkyTable, Slab, Tables};
 pub use texture::{Drape, Texture};
+pub use things::Placed;
 
 use crate::field::{Lakes, Land, Sea, Water};
+use crate::objects::Standing;
 use crate::space::View;
 use glam::DVec3;
 
@@ -62,6 +65,8 @@ pub struct Scene<'a> {
     pub lakes: Option<&'a Lakes>,
     /// The waves on that water, of which the level is the same; without them there is a light air over still water.
     pub sea: Option<&'a Sea>,
+    /// What stands on the land and floats on the water.
+    pub objects: &'a [Standing],
     /// The sun.
     pub sun: Sun,
     /// The air between things and the eye.
@@ -87,6 +92,7 @@ impl<'a> Scene<'a> {
             water,
             lakes: None,
             sea: None,
+            objects: &[],
             sun: Sun::new(240f64.to_radians(), 25f64.to_radians()),
             air: Air::default(),
             style: Style::Natural,

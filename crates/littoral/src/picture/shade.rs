@@ -11,6 +11,7 @@ use super::sampler::Pattern;
 use super::sea::{Ripples, Streaks, fresnel, glitter, lace, refract, ripples};
 use super::skylight::irradiance;
 use super::stage::{HIGHEST_EYE, Lens, Stage};
+use super::things::Thing;
 use super::tile::FIRST;
 use super::waves::Wet;
 use crate::field::{Beach, InLake, Sea};
@@ -39,6 +40,8 @@ pub enum Ahead {
         /// Where (m).
         position: DVec3,
     },
+    /// An object on land or water.
+    Object(Thing),
     /// The side of a block.
     Wall(Wall),
     /// What a block stands on.
@@ -46,6 +49,21 @@ pub enum Ahead {
         /// Where (m).
         position: DVec3,
     },
+}
+
+impl Ahead {
+    /// Where it is (m); `None` for the sky.
+    pub fn position(&self) -> Option<DVec3> {
+        match *self {
+            Ahead::Sky => None,
+            Ahead::Mist { position }
+            | Ahead::Water { position, .. }
+            | Ahead::Ground { position }
+            | Ahead::Object(Thing { position, .. })
+            | Ahead::Floor { position }
+            | Ahead::Wall(Wall { position, .. }) => Some(position),
+        }
+    }
 }
 
 /// The light of one ray, but for what shadow and mirror rays will find.
@@ -103,16 +121,16 @@ impl<T: Copy> Lent<T> {
 
 /// One sample's look at something.
 #[derive(Clone, Copy)]
-struct Look<'a> {
+pub(super) struct Look<'a> {
     /// Away from the eye, unit.
     direction: Vec3,
     /// What is looked at (m).
     position: DVec3,
     /// How far away it is (m).
-    distance: f32,
+    pub distance: f32,
     /// The pixel's random numbers, and which of them are the sample's.
-    pattern: Pattern<'a>,
-    index: u32,
+    pub pattern: Pattern<'a>,
+    pub index: u32,
 }
 
 /// Samples that share one look-up: two of the first few, so that these can disagree, and four of the others.
@@ -156,22 +174,16 @@ impl Stage<'_> {
         if self.scene.style == Style::Relief {
             return self.painted(lens, direction, ahead);
         }
-        let position = match *ahead {
-            Ahead::Sky => {
-                let light = lens.sky.radiance(direction) + lens.sky.sun_disc(direction);
-                return Shaded { light, through: Vec3::ONE, sky: true, ..Shaded::default() };
-            }
-            Ahead::Mist { position }
-            | Ahead::Water { position, .. }
-            | Ahead::Ground { position }
-            | Ahead::Floor { position }
-            | Ahead::Wall(Wall { position, .. }) => position,
+        let Some(position) = ahead.position() else {
+            let light = lens.sky.radiance(direction) + lens.sky.sun_disc(direction);
+            return Shaded { light, through: Vec3::ONE, sky: true, ..Shaded::default() };
         };
         let distance = (position - lens.eye).length() as f32;
         let look = Look { direction, position, distance, pattern, index };
         let mut shaded = match ahead {
             Ahead::Water { wet, .. } => self.water(lens, &look, wet.as_ref(), near),
             Ahead::Ground { .. } => self.ground(lens, &look, near),
+            Ahead::Object(thing) => self.object(lens, &look, thing),
             Ahead::Wall(wall) => self.cut(lens, direction, wall, self.to_sun(pattern, index)),
             Ahead::Floor { .. } => self.floor(lens, position, self.to_sun(pattern, index)),
             _ => Shaded { light: self.mist, ..Shaded::default() },
@@ -220,7 +232,7 @@ impl Stage<'_> {
     }
 
     /// A direction to a random point of the sun's disc.
-    fn to_sun(&self, pattern: Pattern, index: u32) -> Vec3 {
+    pub(super) fn to_sun(&self, pattern: Pattern, index: u32) -> Vec3 {
         let across = self.sun.any_orthonormal_vector();
         let disc = pattern.disc(index) * self.scene.sun.angular_radius as f32;
         (self.sun + across * disc.x + self.sun.cross(across) * disc.y).normalize()

@@ -9,6 +9,7 @@
 //! representation for irradiance environment maps", SIGGRAPH 2001.
 
 use super::atmosphere::{Atmosphere, Sky};
+use super::grain::step;
 use super::ground::Ground;
 use super::tables::Lattice;
 use glam::{DVec2, Vec2, Vec3};
@@ -113,6 +114,17 @@ impl Skylight {
         let (a, b, c, d) = (&self.lights[a], &self.lights[b], &self.lights[c], &self.lights[d]);
         std::array::from_fn(|i| a[i] * wa + b[i] * wb + c[i] * wc + d[i] * wd)
     }
+
+    /// Light arriving at a height (m) above the ground there. The grid knows the ground's horizon; what rises over the ground by a good part of the grid's step sees
+    /// past the relief that hides the sky from it.
+    pub fn above(&self, at: DVec2, height: f32) -> Light {
+        let free = step(0.0, Skylight::CLEAR * self.step.max_element() as f32, height);
+        let low = self.at(at);
+        std::array::from_fn(|i| low[i].lerp(self.open[i], free))
+    }
+
+    /// Height from which on nothing near hides the sky, in steps of the grid.
+    const CLEAR: f32 = 0.3;
 
     /// How much of the sun's disc is seen from the ground at a world position (m), as far as the grid knows.
     pub fn sunny(&self, at: DVec2) -> f32 {

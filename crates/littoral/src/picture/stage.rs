@@ -10,6 +10,7 @@ use super::sampler::Patterns;
 use super::sea::Depths;
 use super::shade::Ahead;
 use super::skylight::{Skylight, irradiance};
+use super::things::Things;
 use super::tile::{Mosaic, Pixel, TILE};
 use super::waves::Wet;
 use super::{Medium, Picture, Scene, Settings, Style};
@@ -78,6 +79,8 @@ pub(super) struct Lens<'a> {
     pub sea: Option<&'a Sea>,
     /// A mesh that stands for their surface.
     pub water: Option<&'a Drawn>,
+    /// The objects that are seen.
+    pub things: Option<Things>,
 }
 
 impl<'a> Stage<'a> {
@@ -184,6 +187,7 @@ impl<'a> Stage<'a> {
             caster,
             sea: sea.filter(|_| self.shows_waves()),
             water,
+            things: self.things(sea, view),
         };
         // Not by whoever of the tiles asks first: a tile that the flood lets in meanwhile would wait for itself.
         if lens.sea.is_some() {

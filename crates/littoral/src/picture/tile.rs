@@ -129,6 +129,11 @@ impl Stage<'_> {
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
         let wet = self.wet_all(lens, &rays, &distances, LENT, per_pixel);
+        let wet = |k: usize| wet.get(k).copied().flatten();
+        let seen = rays.iter().zip(&distances).enumerate();
+        let mut ahead: Vec<Ahead> =
+            seen.map(|(k, (ray, &distance))| self.ahead(lens, ray.direction, distance, wet(k))).collect();
+        self.objects_before(lens, &rays, &mut ahead);
         let mut shaded: Vec<Shaded> = Vec::with_capacity(rays.len());
         let (mut shadow_rays, mut shadow_of) = (Vec::new(), Vec::new());
         let (mut mirror_rays, mut mirror_of) = (Vec::new(), Vec::new());
@@ -137,8 +142,7 @@ impl Stage<'_> {
             let mut near = Near::default();
             for s in samples.clone() {
                 let k = n * per_pixel + (s - samples.start) as usize;
-                let ahead = self.ahead(lens, rays[k].direction, distances[k], wet.get(k).copied().flatten());
-                let sample = self.shade(lens, rays[k].direction, &ahead, pattern, s, &mut near);
+                let sample = self.shade(lens, rays[k].direction, &ahead[k], pattern, s, &mut near);
                 if let Some(ray) = sample.shadow {
                     shadow_rays.push(ray);
                     shadow_of.push(k);
@@ -225,20 +229,24 @@ impl Stage<'_> {
         let mut distances = vec![f32::INFINITY; rays.len()];
         lens.caster.first_hits(&rays, &mut distances);
         let wet = self.wet_all(lens, &rays, &distances, 1, 1);
-        let seen = rays.iter().zip(&distances).enumerate().map(|(k, (ray, &distance))| {
-            match self.ahead(lens, ray.direction, distance, wet.get(k).copied().flatten()) {
-                // Mist and floor stand for what is not known: nothing was measured there.
-                Ahead::Sky | Ahead::Mist { .. } | Ahead::Floor { .. } => None,
-                Ahead::Water { position, wet } => {
-                    let slope = wet.map_or(Vec2::ZERO, |w| w.slope);
-                    Some((position, Vec3::new(-slope.x, -slope.y, 1.0).normalize()))
-                }
-                Ahead::Wall(wall) => Some((wall.position, wall.normal)),
-                // The ground drawn reaches a little beyond the land, to dissolve into mist there.
-                Ahead::Ground { position } => {
-                    let normal = self.scene.land.normal_at(position.truncate());
-                    normal.map(|normal| (position, normal))
-                }
+        let wet = |k: usize| wet.get(k).copied().flatten();
+        let seen = rays.iter().zip(&distances).enumerate();
+        let mut ahead: Vec<Ahead> =
+            seen.map(|(k, (ray, &distance))| self.ahead(lens, ray.direction, distance, wet(k))).collect();
+        self.objects_before(lens, &rays, &mut ahead);
+        let seen = ahead.into_iter().map(|ahead| match ahead {
+            // Mist and floor stand for what is not known: nothing was measured there.
+            Ahead::Sky | Ahead::Mist { .. } | Ahead::Floor { .. } => None,
+            Ahead::Water { position, wet } => {
+                let slope = wet.map_or(Vec2::ZERO, |w| w.slope);
+                Some((position, Vec3::new(-slope.x, -slope.y, 1.0).normalize()))
+            }
+            Ahead::Wall(wall) => Some((wall.position, wall.normal)),
+            Ahead::Object(thing) => Some((thing.position, thing.normal)),
+            // The ground drawn reaches a little beyond the land, to dissolve into mist there.
+            Ahead::Ground { position } => {
+                let normal = self.scene.land.normal_at(position.truncate());
+                normal.map(|normal| (position, normal))
             }
         });
         seen.collect()

@@ -69,6 +69,13 @@ impl View {
         (corner + right * pixel.x + down * pixel.y).normalize()
     }
 
+    /// Whether anything of a ball may lie in the frame: its middle from the eye (m), and its radius (m). `false` is certain.
+    pub fn may_see(&self, middle: Vec3, radius: f32) -> bool {
+        let [across, upward, depth] = [0, 1, 3].map(|i| self.clip_from_eye.row(i).truncate());
+        let sides = [depth, depth + across, depth - across, depth + upward, depth - upward];
+        sides.iter().all(|side| side.dot(middle) >= -radius * side.length())
+    }
+
     /// The pixel coordinate at which a world point appears, or `None` when it lies behind the eye.
     pub fn pixel(&self, world: DVec3) -> Option<Vec2> {
         let clip = self.clip_from_eye * (world - self.eye).as_vec3().extend(1.0);
@@ -96,6 +103,28 @@ mod tests {
         assert!((forward - Vec3::new(3.0, 4.0, -1.0).normalize()).length() < 1e-5);
         assert!(view.direction(Vec2::new(320.0, 0.0)).z > forward.z, "the top of the picture is up");
         assert!(view.pixel(eye - forward.as_dvec3()).is_none(), "behind the eye");
+    }
+
+    #[test]
+    fn balls_are_missed_only_where_nothing_of_them_is_seen() {
+        let size = UVec2::new(64, 48);
+        let view = View::looking_at(DVec3::new(5.0, 6.0, 70.0), DVec3::new(50.0, 90.0, 20.0), 0.8, size);
+        let mut missed = 0;
+        for i in 0..4000u32 {
+            let turn =
+                |k: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(k * 40_503) >> 8) as f32 / 16_777_216.0 - 0.5;
+            let (middle, radius) = (300.0 * Vec3::new(turn(1), turn(7), turn(31)), 20.0 * (turn(77) + 0.5));
+            let within = |at: Vec3| {
+                view.pixel(view.eye + at.as_dvec3())
+                    .is_some_and(|p| p.cmpge(Vec2::ZERO).all() && p.cmple(size.as_vec2()).all())
+            };
+            let sees = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z]
+                .iter()
+                .any(|to| within(middle + *to * radius) || within(middle - *to * radius));
+            assert!(!sees || view.may_see(middle, radius), "{middle} {radius}");
+            missed += u32::from(!view.may_see(middle, radius));
+        }
+        assert!(missed > 2000, "{missed}");
     }
 
     #[test]

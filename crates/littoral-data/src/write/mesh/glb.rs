@@ -87,22 +87,7 @@ pub(super) fn write(sink: &mut dyn Sink, model: &Model, origin: DVec3, notes: &[
         "bufferViews": views,
         "buffers": [{ "byteLength": offset }],
     });
-    let mut head = serde_json::to_vec(&head).map_err(io::Error::other)?;
-    // Chunks are whole numbers of four bytes; what is in the other one is so by itself.
-    head.resize(head.len().next_multiple_of(4), b' ');
-    let all = 12 + 8 + head.len() + 8 + offset;
-    let sizes = [all, head.len(), offset].map(u32::try_from);
-    let [Ok(all), Ok(head_length), Ok(offset)] = sizes else {
-        return Err(io::Error::other("expected less than 4 GiB in a GLB file, got more; write .ply"));
-    };
-    sink.write_all(b"glTF")?;
-    for number in [2, all, head_length] {
-        sink.write_all(&number.to_le_bytes())?;
-    }
-    sink.write_all(b"JSON")?;
-    sink.write_all(&head)?;
-    sink.write_all(&offset.to_le_bytes())?;
-    sink.write_all(b"BIN\0")?;
+    begin(sink, &head, offset)?;
     let mut put = |vector: Vec3| sink.write_all(vector.to_array().map(f32::to_le_bytes).as_flattened());
     for at in &model.positions {
         put(place(at))?;
@@ -116,4 +101,24 @@ pub(super) fn write(sink: &mut dyn Sink, model: &Model, origin: DVec3, notes: &[
         sink.write_all(&number.to_le_bytes())?;
     }
     Ok(())
+}
+
+/// Writes all of a file but its bytes, a whole number of four, which are to follow.
+pub(crate) fn begin(sink: &mut dyn Sink, head: &Value, bytes: usize) -> io::Result<()> {
+    let mut head = serde_json::to_vec(head).map_err(io::Error::other)?;
+    // Chunks are whole numbers of four bytes; what is in the other one is so by itself.
+    head.resize(head.len().next_multiple_of(4), b' ');
+    let all = 12 + 8 + head.len() + 8 + bytes;
+    let sizes = [all, head.len(), bytes].map(u32::try_from);
+    let [Ok(all), Ok(head_length), Ok(bytes)] = sizes else {
+        return Err(io::Error::other("expected less than 4 GiB in a GLB file, got more; write .ply"));
+    };
+    sink.write_all(b"glTF")?;
+    for number in [2, all, head_length] {
+        sink.write_all(&number.to_le_bytes())?;
+    }
+    sink.write_all(b"JSON")?;
+    sink.write_all(&head)?;
+    sink.write_all(&bytes.to_le_bytes())?;
+    sink.write_all(b"BIN\0")
 }

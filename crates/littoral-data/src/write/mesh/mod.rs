@@ -10,6 +10,8 @@ mod obj;
 mod ply;
 mod stl;
 
+pub(super) use glb::begin as begin_glb;
+
 use super::whole;
 use crate::Error;
 use glam::{DVec2, DVec3};
