@@ -10,11 +10,6 @@ fn is_map() -> bool {
     return frame.coat.x == 1.0 || is_paper();
 }
 
-// Whether it is a shaded relief: paper, without sun or air, of which there are only tones.
-fn is_paper() -> bool {
-    return frame.coat.x == 3.0;
-}
-
 // Albedo of a map at a place and height over the sea (m).
 fn tint_at(rel: vec2f, z: f32) -> vec3f {
     if lake_at(rel) >= 0.0 {

@@ -99,3 +99,8 @@ fn drop_of(rel: vec2f) -> f32 {
 fn normal_of_slope(slope: vec2f) -> vec3f {
     return normalize(vec3f(-slope, 1.0));
 }
+
+// Whether the ground is seen as a shaded relief: paper, without sun or air, of which there are only tones.
+fn is_paper() -> bool {
+    return frame.coat.x == 3.0;
+}
