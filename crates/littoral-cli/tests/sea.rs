@@ -238,6 +238,33 @@ fn a_buoy_makes_the_sea_of_every_command() {
 }
 
 #[test]
+fn a_record_is_the_answers_of_its_instants() {
+    let sea = ["waves", "height", "--sea", "wind=12,from=200", "--time", "3"];
+    let until = ["--until", "4.2", "--every", "0.4", "--at", "10,-20", "11,-20"];
+    let record = json(&[&sea[..], &until].concat());
+    let moments = record["record"].as_array().expect("instants");
+    assert_eq!(moments.len(), 4);
+    let output = littoral(&[&sea[..], &until].concat());
+    let lines: Vec<Vec<f64>> = text(&output.stdout)
+        .lines()
+        .map(|line| line.split(',').map(|field| field.parse().expect("a number")).collect())
+        .collect();
+    assert_eq!(lines.len(), 8);
+    for (i, moment) in moments.iter().enumerate() {
+        let time = 3.0 + 0.4 * i as f64;
+        assert!((moment["time"].as_f64().expect("a time") - time).abs() < 1e-9);
+        let then = ["waves", "height", "--sea", "wind=12,from=200", "--time", &time.to_string()];
+        let alone = json(&[&then[..], &["--at", "10,-20", "11,-20"]].concat());
+        let [told, alone] = [&moment["height"], &alone["height"]].map(|heights| numbers(heights));
+        assert!(told.iter().zip(&alone).all(|(a, b)| (a - b).abs() < 1e-6), "{told:?} for {alone:?}");
+        assert!(lines[2 * i].len() == 10 && (lines[2 * i][0] - time).abs() < 1e-6);
+        assert!((lines[2 * i][3] - told[0]).abs() < 1e-5 && lines[2 * i + 1][1..3] == [11.0, -20.0]);
+    }
+    assert_eq!(record["height"], moments[0]["height"]);
+    assert_ne!(moments[3]["height"], moments[0]["height"]);
+}
+
+#[test]
 fn nonsense_is_refused_and_named() {
     let height = |rest: &[&str], words: &str| fails(&[&["waves", "height"], rest].concat(), 2, words);
     height(&["--at", "0,0"], "--sea <SPEC>");
@@ -246,6 +273,9 @@ fn nonsense_is_refused_and_named() {
     height(&["--sea", "wind=9", "--at", "0,nan"], "expected two numbers X,Y");
     height(&["--sea", "wind=9,seed=1", "--seed", "2", "--at", "0,0"], "got both");
     height(&["--sea", "wind=9", "--at", "0,0", "--time", "nan"], "-1e9 to 1e9 seconds");
+    height(&["--sea", "wind=9", "--at", "0,0", "--time", "5", "--until", "4"], "ends after it begins");
+    height(&["--sea", "wind=9", "--at", "0,0", "--until", "1e9", "--every", "0.001"], "at most 1e8 answers");
+    height(&["--sea", "wind=9", "--at", "0,0", "--every", "1"], "--until");
     height(&["--sea", "wind=9", "--at", "0,0", "--lonlat"], "--land");
     height(&["--sea", "wind=9", "--at", "0,0", "--below", "-1"], "a depth from 0");
     fails(&["waves", "height", "--sea", "wind=9", "--at", "1e300,0"], 1, "within 1e9 m");

