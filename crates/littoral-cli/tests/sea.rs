@@ -255,7 +255,7 @@ fn a_record_is_the_answers_of_its_instants() {
         assert!((moment["time"].as_f64().expect("a time") - time).abs() < 1e-9);
         let then = ["waves", "height", "--sea", "wind=12,from=200", "--time", &time.to_string()];
         let alone = json(&[&then[..], &["--at", "10,-20", "11,-20"]].concat());
-        let [told, alone] = [&moment["height"], &alone["height"]].map(|heights| numbers(heights));
+        let [told, alone] = [&moment["height"], &alone["height"]].map(numbers);
         assert!(told.iter().zip(&alone).all(|(a, b)| (a - b).abs() < 1e-6), "{told:?} for {alone:?}");
         assert!(lines[2 * i].len() == 10 && (lines[2 * i][0] - time).abs() < 1e-6);
         assert!((lines[2 * i][3] - told[0]).abs() < 1e-5 && lines[2 * i + 1][1..3] == [11.0, -20.0]);
