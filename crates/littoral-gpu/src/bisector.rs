@@ -16,7 +16,8 @@
 //! Works this rests on: J. Dupuy, "Concurrent binary trees", 2020 (bits under sums); A. Benyoub and J. Dupuy, "Concurrent binary trees for large-scale game components",
 //! 2024 (splits and merges of every frame, which there wait for and force each other); M. Duchaineau et al., "ROAMing terrain", 1997.
 
-use crate::compute::{TEXELS, VOID, bind, binding, layout, numbers, read};
+use crate::bindings;
+use crate::compute::{VOID, numbers, read};
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use crate::tessellator::Tessellated;
@@ -254,12 +255,14 @@ impl Bisector {
         let corners = buffer("bisection: triangles", 12 * most, storage | Usage::INDEX | Usage::COPY_SRC);
         let drawn = buffer("bisection: draw", 20, storage | Usage::INDIRECT | Usage::COPY_DST | Usage::COPY_SRC);
 
-        let (uniform, write) =
-            (binding(wgpu::BufferBindingType::Uniform), binding(wgpu::BufferBindingType::Storage { read_only: false }));
-        let shared = [uniform, TEXELS, TEXELS, write, write, write, write];
-        let update_layout = layout(device, &[&shared[..], &[write]].concat());
-        let turn_layout = layout(device, &[write]);
-        let draw_layout = layout(device, &[&shared[..], &[write, write, write]].concat());
+        let (uniform, texels, write) = (bindings::uniform(false), bindings::numbers(), bindings::storage(false));
+        let layout = |types: &[wgpu::BindingType]| {
+            bindings::group_layout(device, "bisection", wgpu::ShaderStages::COMPUTE, types)
+        };
+        let shared = [uniform, texels, texels, write, write, write, write];
+        let update_layout = layout(&[&shared[..], &[write]].concat());
+        let turn_layout = layout(&[write]);
+        let draw_layout = layout(&[&shared[..], &[write, write, write]].concat());
         let views = [&heights, &known].map(|texture| texture.create_view(&Default::default()));
         let group = |layout: &wgpu::BindGroupLayout, more: &[&wgpu::Buffer]| {
             let mut resources = vec![
@@ -269,7 +272,7 @@ impl Bisector {
             ];
             let buffers = [&words, &sums, &list, &state];
             resources.extend(buffers.into_iter().chain(more.iter().copied()).map(wgpu::Buffer::as_entire_binding));
-            bind(device, layout, resources)
+            bindings::group(device, "bisection", layout, resources)
         };
         let [update, draw] = BISECTION_SHADERS.map(|(label, source)| {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -277,12 +280,8 @@ impl Bisector {
                 source: wgpu::ShaderSource::Wgsl(source.into()),
             })
         });
-        let pipeline = |module, entry, groups: &[Option<&wgpu::BindGroupLayout>]| {
-            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("bisection"),
-                bind_group_layouts: groups,
-                immediate_size: 0,
-            });
+        let pipeline = |module, entry, groups: &[&wgpu::BindGroupLayout]| {
+            let layout = bindings::pipeline_layout(device, "bisection", groups);
             device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(entry),
                 layout: Some(&layout),
@@ -292,9 +291,9 @@ impl Bisector {
                 cache: None,
             })
         };
-        let alone = [Some(&update_layout)];
-        let both = [Some(&update_layout), Some(&turn_layout)];
-        let out = [Some(&draw_layout)];
+        let alone = [&update_layout];
+        let both = [&update_layout, &turn_layout];
+        let out = [&draw_layout];
         Ok(Bisector {
             datum: bounds.datum(),
             scale: bounds.scale(),
@@ -310,7 +309,7 @@ impl Bisector {
             place: pipeline(&draw, "place", &out),
             draw: pipeline(&draw, "draw", &out),
             updating: group(&update_layout, &[&bins]),
-            dispatching: bind(device, &turn_layout, vec![turns.as_entire_binding()]),
+            dispatching: bindings::group(device, "bisection", &turn_layout, [turns.as_entire_binding()]),
             drawing: group(&draw_layout, &[&vertices, &corners, &drawn]),
             numbers: all,
             sight,

@@ -1,28 +1,8 @@
-//! What all compute passes need: layouts and groups of bindings, textures of numbers, buffers read back.
+//! What compute passes share: textures of numbers, and buffers read back.
 
-use crate::bindings;
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use littoral::field::Land;
-
-/// A texture of whole numbers that is read texel by texel.
-pub(crate) const TEXELS: wgpu::BindingType = bindings::numbers();
-
-pub(crate) fn binding(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
-    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
-}
-
-pub(crate) fn layout(device: &wgpu::Device, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
-    bindings::group_layout(device, "compute", wgpu::ShaderStages::COMPUTE, types)
-}
-
-pub(crate) fn bind(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    resources: Vec<wgpu::BindingResource>,
-) -> wgpu::BindGroup {
-    bindings::group(device, "compute", layout, resources)
-}
 
 /// The first bytes of a buffer.
 pub(crate) fn read(gpu: &Gpu, from: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, GpuError> {

@@ -2,7 +2,8 @@
 //!
 //! The twin of [`Drawing::expand`] over land. What drawings hold beside patches, meshes and strips with heights of their own, is brought as it is.
 
-use crate::compute::{TEXELS, bind, binding, heights, layout, read};
+use crate::bindings;
+use crate::compute::{heights, read};
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use crate::triangles::{TooMany, Triangles, fill};
@@ -84,18 +85,14 @@ impl Expander {
         let (columns, rows) = (raster.columns() as u32, raster.rows() as u32);
         let heights = heights(gpu, land)?.create_view(&Default::default());
         let device = &gpu.device;
-        let storage = |read_only| binding(wgpu::BufferBindingType::Storage { read_only });
-        let uniform = binding(wgpu::BufferBindingType::Uniform);
-        let layout = layout(device, &[uniform, TEXELS, storage(true), storage(false), storage(false), storage(false)]);
+        let (uniform, texels, write) = (bindings::uniform(false), bindings::numbers(), bindings::storage(false));
+        let types = [uniform, texels, bindings::storage(true), write, write, write];
+        let layout = bindings::group_layout(device, "expansion", wgpu::ShaderStages::COMPUTE, &types);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(EXPANSION_SHADER.0),
             source: wgpu::ShaderSource::Wgsl(EXPANSION_SHADER.1.into()),
         });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("expansion"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
+        let pipeline_layout = bindings::pipeline_layout(device, "expansion", &[&layout]);
         let pipeline = |entry| {
             device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(entry),
@@ -173,7 +170,7 @@ impl Expander {
         else {
             return Ok(());
         };
-        let resources = vec![
+        let resources = [
             self.here.as_entire_binding(),
             wgpu::BindingResource::TextureView(&self.heights),
             patches.as_entire_binding(),
@@ -181,7 +178,7 @@ impl Expander {
             corners.as_entire_binding(),
             drawn.as_entire_binding(),
         ];
-        let group = bind(&gpu.device, &self.layout, resources);
+        let group = bindings::group(&gpu.device, "expansion", &self.layout, resources);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("expansion"), timestamp_writes: None });

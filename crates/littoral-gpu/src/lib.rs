@@ -2,7 +2,8 @@
 //!
 //! The caller owns device, queue and target ([`Gpu`] makes the first two for those who have none). A [`Renderer`] is made once for a device, a [`Scenery`] once
 //! for a scene made ready ([`littoral::picture::Stage`]), and each frame draws the exact
-//! surface by rays ([`ShapeTexture`]) or what a level-of-detail method chose ([`littoral::lod::Drawing`]).
+//! surface by rays ([`ShapeTexture`]) or the triangles of a level-of-detail method: chosen on the device ([`Tessellator`], [`Bisector`]), or on the processor
+//! ([`littoral::lod::Drawing`]) and brought as patches ([`Expander`]) or as a mesh ([`Triangles`]).
 //!
 //! A picture takes two steps: first only how far away surfaces are, by rays or triangles; then every pixel is lit once, from the data and not from the triangles.
 //! So light costs the same whatever the method, and pictures of two methods differ by where they find the ground alone.

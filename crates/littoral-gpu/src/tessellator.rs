@@ -16,7 +16,8 @@
 mod land;
 mod passes;
 
-use crate::compute::{bind, read};
+use crate::bindings;
+use crate::compute::read;
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use crate::triangles::Triangles;
@@ -204,12 +205,13 @@ impl Tessellator {
             ];
             let lists = [&state, &places, &beside, &looks];
             resources.extend(lists.into_iter().chain(more.iter().copied()).map(wgpu::Buffer::as_entire_binding));
-            bind(device, layout, resources)
+            bindings::group(device, "tessellation", layout, resources)
         };
         Ok(Tessellator {
             passes: passes.clone(),
             levels: (0..=finest).map(|number| group(number, &passes.level, &[&bins])).collect(),
-            turns: [0, 1].map(|turn| bind(device, &passes.turn, vec![turns[turn].as_entire_binding()])),
+            turns: [0, 1]
+                .map(|turn| bindings::group(device, "tessellation", &passes.turn, [turns[turn].as_entire_binding()])),
             drawing: group(finest, &passes.drawing, &[&vertices, &corners, &drawn]),
             land: on_device,
             finest,

@@ -68,7 +68,6 @@ impl Pages {
                 level
             })
             .collect();
-        // The finest levels of which all pages would be there anyway need no more.
         let most = gpu.device.limits().max_texture_dimension_2d / PAGE;
         let room = bytes / u64::from(4 * PAGE * PAGE);
         let across = (room.isqrt() as u32).clamp(2, most.max(2));
@@ -98,7 +97,8 @@ impl Pages {
         Pages { atlas, table, levels, words, places, held: HashMap::new(), clock: 0 }
     }
 
-    /// Brings the pages that a view needs of a picture over land between two heights (m), no more than `most` that are not there yet. `true` once all are.
+    /// Brings the pages that a view needs of a picture over land between two heights (m), no more than `most` that are not there yet. Whether all
+    /// are, and whether anything has changed.
     pub fn bring(
         &mut self,
         gpu: &Gpu,
