@@ -20,7 +20,8 @@ pub fn show(ui: &mut Ui, cockpit: &Cockpit) {
 /// How well it is drawn.
 fn drawn(ui: &mut Ui, cockpit: &Cockpit) {
     let milliseconds = median(cockpit.history.frame.iter().rev().take(12).copied());
-    ui.label(format!("{:.0} frames/s", if milliseconds > 0.0 { 1000.0 / milliseconds } else { 0.0 }));
+    let rate = if milliseconds > 0.0 { 1000.0 / milliseconds } else { 0.0 };
+    ui.label(format!("{rate:.*} frames/s", usize::from(rate < 9.95)));
     let Some(first) = cockpit.frame.as_ref().map(|frame| &frame.first) else { return };
     ui.label(format!("{} in {:.1} ms", first.detail.method, first.milliseconds));
     ui.label(format!("{} triangles", thousands(first.triangles())));
