@@ -251,9 +251,7 @@ impl Bisector {
         let list = buffer("bisection: list", 8 * room, storage);
         let bins = buffer("bisection: census", 4 * BINS, storage | Usage::COPY_DST);
         let turns = buffer("bisection: workgroups", 48, storage | Usage::INDIRECT);
-        let vertices = buffer("bisection: vertices", vertex * (most + 4), storage | Usage::VERTEX | Usage::COPY_SRC);
-        let corners = buffer("bisection: triangles", 12 * most, storage | Usage::INDEX | Usage::COPY_SRC);
-        let drawn = buffer("bisection: draw", 20, storage | Usage::INDIRECT | Usage::COPY_DST | Usage::COPY_SRC);
+        let (triangles, [vertices, corners, drawn]) = Triangles::made(gpu, most + 4, most);
 
         let (uniform, texels, write) = (bindings::uniform(false), bindings::numbers(), bindings::storage(false));
         let layout = |types: &[wgpu::BindingType]| {
@@ -316,12 +314,7 @@ impl Bisector {
             state,
             bins,
             workgroups: turns,
-            triangles: Triangles {
-                vertices: Some(vertices),
-                corners: Some(corners),
-                count: 3 * most as u32,
-                drawn: Some(drawn),
-            },
+            triangles,
             tolerance: 0.0,
         })
     }
@@ -430,10 +423,7 @@ impl Bisector {
     /// If the device was lost.
     pub fn read(&self, gpu: &Gpu) -> Result<Tessellated, GpuError> {
         let state: State = bytemuck::pod_read_unaligned(&read(gpu, &self.state, size_of::<State>() as u64)?);
-        let mut triangles = 0;
-        if let Some(drawn) = &self.triangles.drawn {
-            triangles = bytemuck::pod_read_unaligned::<u32>(&read(gpu, drawn, 4)?) / 3;
-        }
+        let triangles = self.triangles.number_made(gpu)?;
         let pixels = if state.lost == 0 { state.reached } else { f32::INFINITY };
         let reached = Reached { pixels, limited: state.reached > self.tolerance };
         Ok(Tessellated { reached, triangles, vertices: state.listed + 4, looked_at: state.used })

@@ -3,7 +3,7 @@
 //! The twin of [`Drawing::expand`] over land. What drawings hold beside patches, meshes and strips with heights of their own, is brought as it is.
 
 use crate::bindings;
-use crate::compute::{heights, read};
+use crate::compute::heights;
 use crate::device::{Gpu, GpuError};
 use crate::scenery::TooLarge;
 use crate::triangles::{TooMany, Triangles, fill};
@@ -202,8 +202,7 @@ impl Expander {
     /// # Errors
     /// If the device was lost.
     pub fn count(&self, gpu: &Gpu) -> Result<u32, GpuError> {
-        let Some(drawn) = &self.triangles.drawn else { return Ok(0) };
-        Ok(bytemuck::pod_read_unaligned::<u32>(&read(gpu, drawn, 4)?) / 3)
+        self.triangles.number_made(gpu)
     }
 
     /// The triangles that were submitted last, read back. Waits for the device: for tests and tools.

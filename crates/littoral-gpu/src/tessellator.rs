@@ -185,9 +185,7 @@ impl Tessellator {
         let bins = buffer("tessellation: census", 4 * BINS, storage | Usage::COPY_DST);
         let turn = || buffer("tessellation: workgroups", 24, storage | Usage::INDIRECT);
         let turns = [turn(), turn()];
-        let vertices = buffer("tessellation: vertices", 3 * vertex * most, storage | Usage::VERTEX | Usage::COPY_SRC);
-        let corners = buffer("tessellation: triangles", 12 * most, storage | Usage::INDEX | Usage::COPY_SRC);
-        let drawn = buffer("tessellation: draw", 20, storage | Usage::INDIRECT | Usage::COPY_DST | Usage::COPY_SRC);
+        let (triangles, [vertices, corners, drawn]) = Triangles::made(gpu, 3 * most, most);
 
         let group = |number: u8, layout: &wgpu::BindGroupLayout, more: &[&wgpu::Buffer]| {
             let views =
@@ -221,12 +219,7 @@ impl Tessellator {
             state,
             bins,
             workgroups: turns,
-            triangles: Triangles {
-                vertices: Some(vertices),
-                corners: Some(corners),
-                count: 3 * most as u32,
-                drawn: Some(drawn),
-            },
+            triangles,
             tolerance: 0.0,
         })
     }
@@ -332,10 +325,7 @@ impl Tessellator {
     pub fn read(&self, gpu: &Gpu) -> Result<Tessellated, GpuError> {
         let bytes = read(gpu, &self.state, size_of::<State>() as u64)?;
         let state: State = bytemuck::pod_read_unaligned(&bytes);
-        let mut triangles = 0;
-        if let Some(drawn) = &self.triangles.drawn {
-            triangles = bytemuck::pod_read_unaligned::<u32>(&read(gpu, drawn, 4)?) / 3;
-        }
+        let triangles = self.triangles.number_made(gpu)?;
         let reached = Reached { pixels: state.reached, limited: state.reached > self.tolerance };
         Ok(Tessellated { reached, triangles, vertices: state.vertices, looked_at: state.used })
     }

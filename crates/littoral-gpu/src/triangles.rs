@@ -33,6 +33,26 @@ impl Triangles {
         Ok(())
     }
 
+    /// Room for so many vertices and triangles, all of which the device makes, and the buffers for them: vertices, corners, and what the draw is told.
+    pub(crate) fn made(gpu: &Gpu, vertices: u64, triangles: u64) -> (Triangles, [wgpu::Buffer; 3]) {
+        let buffers = [
+            ("vertices", vertices * size_of::<Vertex>() as u64, VERTICES),
+            ("triangles", 12 * triangles, CORNERS),
+            ("draw", 20, DRAWN),
+        ]
+        .map(|(label, size, usage)| {
+            let usage = usage | wgpu::BufferUsages::COPY_DST;
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
+        });
+        let [vertices, corners, drawn] = buffers.clone().map(Some);
+        (Triangles { vertices, corners, count: 3 * triangles as u32, drawn }, buffers)
+    }
+
     /// Brings a mesh to the device with room for so many vertices and triangles in all, the rest of which the device makes.
     pub(crate) fn make(&mut self, gpu: &Gpu, mesh: &Mesh, [vertices, triangles]: [u64; 2]) {
         let to = reserve(gpu, &mut self.vertices, "vertices", VERTICES, vertices * size_of::<Vertex>() as u64);
@@ -40,9 +60,14 @@ impl Triangles {
         let to = reserve(gpu, &mut self.corners, "triangles", CORNERS, 12 * triangles);
         gpu.queue.write_buffer(to, 0, bytemuck::cast_slice(&mesh.triangles));
         let drawn = [3 * mesh.triangles.len() as u32, 1, 0, 0, 0];
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_SRC;
-        fill(gpu, &mut self.drawn, "draw", usage, bytemuck::cast_slice(&drawn));
+        fill(gpu, &mut self.drawn, "draw", DRAWN, bytemuck::cast_slice(&drawn));
         self.count = 3 * triangles as u32;
+    }
+
+    /// How many triangles the device made, read back.
+    pub(crate) fn number_made(&self, gpu: &Gpu) -> Result<u32, GpuError> {
+        let Some(drawn) = &self.drawn else { return Ok(0) };
+        Ok(bytemuck::pod_read_unaligned::<u32>(&read(gpu, drawn, 4)?) / 3)
     }
 
     /// So many vertices and triangles, read back.
@@ -83,6 +108,8 @@ const VERTICES: wgpu::BufferUsages =
     wgpu::BufferUsages::VERTEX.union(wgpu::BufferUsages::STORAGE).union(wgpu::BufferUsages::COPY_SRC);
 const CORNERS: wgpu::BufferUsages =
     wgpu::BufferUsages::INDEX.union(wgpu::BufferUsages::STORAGE).union(wgpu::BufferUsages::COPY_SRC);
+const DRAWN: wgpu::BufferUsages =
+    wgpu::BufferUsages::INDIRECT.union(wgpu::BufferUsages::STORAGE).union(wgpu::BufferUsages::COPY_SRC);
 
 /// Writes bytes into a buffer, making a new one half as large again where they do not fit.
 pub(crate) fn fill(gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>, label: &str, usage: wgpu::BufferUsages, bytes: &[u8]) {
@@ -98,11 +125,14 @@ fn reserve<'a>(
     size: u64,
 ) -> &'a wgpu::Buffer {
     let room = |buffer: &wgpu::Buffer| buffer.size() >= size;
+    // No larger than shaders can read, unless it has to be.
+    let limits = gpu.device.limits();
+    let most = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size).max(size);
     match buffer.take().filter(room) {
         Some(kept) => buffer.insert(kept),
         None => buffer.insert(gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
-            size: (size + size / 2).next_multiple_of(256).clamp(256, gpu.device.limits().max_buffer_size),
+            size: (size + size / 2).clamp(256, most.max(256)).next_multiple_of(4),
             usage: usage | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         })),

@@ -3,16 +3,16 @@
 
 use glam::{DAffine2, DVec2, DVec3, UVec2, Vec3};
 use littoral::field::{HeightField, Land, Raster, Sea, Water};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Patches, Vertex};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Patch, Patches, Stencil, Vertex};
 use littoral::picture::{Border, Drape, Scene, Stage, Style, Texture};
 use littoral::raycast::LocalRay;
-use littoral::space::{Datum, View};
+use littoral::space::{Cell, Datum, View};
 use littoral::waves::cascades::{Cascades, Options, Tile};
 use littoral::waves::{SeaState, Sines, StillWater};
 use littoral_gpu::sea::Transform;
 use littoral_gpu::{
-    Gpu, GpuSea, Ground, Look, Painter, PainterError, PassTimes, Renderer, Scenery, ShapeTexture, TessellationPasses,
-    Tessellator, Triangles, Waves, WavesError,
+    Expander, Gpu, GpuSea, Ground, Look, Painter, PainterError, PassTimes, Renderer, Scenery, ShapeTexture,
+    TessellationPasses, Tessellator, Triangles, Waves, WavesError,
 };
 
 /// A device that does nothing but check what it is asked for.
@@ -348,4 +348,16 @@ fn pages_of_pictures_of_every_size_are_brought() {
             }
         }
     }
+}
+
+#[test]
+fn drawings_nearly_as_large_as_buffers_are_expanded() {
+    let gpu = gpu();
+    let land = bay(9, 9, false);
+    let mut expander = Expander::new(&gpu, &land).expect("a small land");
+    let mut drawing = Drawing::default();
+    // Corners of 101 MB, where shaders read no more than 134.
+    (drawing.stencil, drawing.patches) = (Stencil::Square(32), vec![Patch::of(Cell::face(0)); 4000]);
+    expander.expand(&gpu, &mut drawing).expect("no more than fits");
+    sound(&gpu, "a large drawing");
 }
