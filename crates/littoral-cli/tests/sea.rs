@@ -274,7 +274,8 @@ fn nonsense_is_refused_and_named() {
     height(&["--sea", "wind=9,seed=1", "--seed", "2", "--at", "0,0"], "got both");
     height(&["--sea", "wind=9", "--at", "0,0", "--time", "nan"], "-1e9 to 1e9 seconds");
     height(&["--sea", "wind=9", "--at", "0,0", "--time", "5", "--until", "4"], "ends after it begins");
-    height(&["--sea", "wind=9", "--at", "0,0", "--until", "1e9", "--every", "0.001"], "at most 1e8 answers");
+    let long = ["--sea", "wind=9", "--at", "0,0", "--until", "1e9", "--every", "0.001", "--json"];
+    height(&long, "at most 1e7 answers with --json");
     height(&["--sea", "wind=9", "--at", "0,0", "--every", "1"], "--until");
     height(&["--sea", "wind=9", "--at", "0,0", "--lonlat"], "--land");
     height(&["--sea", "wind=9", "--at", "0,0", "--below", "-1"], "a depth from 0");

@@ -120,7 +120,7 @@ fn flights_show_what_rays_find() {
     let gale = Sea::over(&land, &water, &gale, &|_| true).expect("a sea");
     let low_over = over(low + size * 0.25, low + size * DVec2::new(0.7, 0.6), 150.0, 0.1);
     let high_over = over(low + size * 0.2, low + size * DVec2::new(0.8, 0.5), 5000.0, 0.8);
-    // How far the mesh may be off by its tolerance, a pixel, is within the rays about it; waves of the grid are coarser than those that rays find.
+    // How far the mesh may be off by its tolerance, a pixel, is within the rays about it, but where low ground is grazed and more is seen behind it; waves of the grid are coarser than those that rays find.
     let flights: [(&str, Seen); 4] = [
         ("low over mountains", fly(&gpu, &inland, None, frames, &low_over, 0.01)),
         ("high over mountains", fly(&gpu, &inland, None, frames, &high_over, 0.01)),
