@@ -149,6 +149,12 @@ fn is_water_before(nearer: bool, nearly: bool, at: vec2f, ground: vec2f, level: 
     return submerged && (nearer || nearly && is_within(sample_of(ground)) && mean_of(sample_of(ground), 0u) <= level);
 }
 
+// Whether the ground is seen at a place where a ray comes down to a level over the sea (m): the data rise above it there, so that what was drawn farther off lies behind a crest
+// that a mesh cut off.
+fn is_ground_before(nearer: bool, at: vec2f, level: f32) -> bool {
+    return nearer && is_within(sample_of(at)) && known_at(at) == 1.0 && mean_of(sample_of(at), 0u) > level && !is_cut_away(at);
+}
+
 struct Water {
     ripples: Ripples,
     // How much of it is foam, and where the water rests, from the eye (m).
@@ -241,6 +247,9 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
             is_water = true;
             rel = at;
             distance = length(at);
+        } else if sea > 0.0 && is_ground_before(sea > depth, at.xy, level) {
+            rel = at;
+            distance = length(at);
         }
     }
     let rise = -frame.water.x;
@@ -253,6 +262,9 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let is_before = is_water_before(t <= distance * (1.0 + 1e-6), t <= distance * NEARLY, direction.xy * t, rel.xy, frame.water.x + frame.eye.z);
         if t > 0.0 && is_before && covers(direction.xy * t) {
             is_water = true;
+            distance = t;
+            rel = direction * t;
+        } else if t > 0.0 && is_ground_before(t < distance, direction.xy * t, frame.water.x + frame.eye.z) {
             distance = t;
             rel = direction * t;
         }
