@@ -7,7 +7,7 @@ use crate::talk::{Failure, Talk, progress, tidy};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::DVec3;
 use littoral::field::{HeightField, Land, Sea};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Reached, RoamFlight, ViewError};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, Method, NestedBounds, Reached, RoamFlight, RoamSea, ViewError};
 use littoral::picture::{Meshes, Picture, Settings, Stage};
 use littoral::space::{Datum, View};
 use littoral_gpu::{Gpu, Painter, PainterError};
@@ -31,8 +31,8 @@ pub struct Detail {
     /// Draw on the graphics card (or what stands for one): the exact surface by rays, or the mesh of --lod
     #[arg(long, conflicts_with = "passes", help_heading = "Mesh")]
     pub gpu: bool,
-    /// Choose the mesh for an eye at this place that looks at the same point, and look at it from --eye
-    #[arg(long, value_name = "X,Y,Z", value_parser = input::xyz, requires = "lod", conflicts_with = "path", help_heading = "Mesh")]
+    /// Choose the mesh for an eye at this place that looks at the same point, and look at it from --eye, or all along --path
+    #[arg(long, value_name = "X,Y,Z", value_parser = input::xyz, requires = "lod", help_heading = "Mesh")]
     pub lod_from: Option<DVec3>,
 }
 
@@ -54,6 +54,8 @@ pub struct Chooser<'a> {
     flight: Option<RoamFlight<'a>>,
     ground_drawing: Drawing,
     water: Option<Box<dyn Lod>>,
+    /// ROAM over the sea, which goes on where that over land does.
+    water_flight: Option<RoamSea>,
     water_drawing: Drawing,
     shows_water: bool,
 }
@@ -147,6 +149,7 @@ impl Detail {
             flight: prepared.filter(|_| !self.gpu).map(|bounds| RoamFlight::over(bounds, limits)),
             ground_drawing: Drawing::default(),
             water: None,
+            water_flight: None,
             water_drawing: Drawing::default(),
             shows_water: false,
         })
@@ -203,9 +206,17 @@ impl Chooser<'_> {
             };
             let finest = (size.max_element() / SMALLEST).log2().ceil().clamp(0.0, 30.0) as u8;
             let limits = Limits { finest, triangles: self.detail.triangles as usize };
-            let method = self.detail.lod.unwrap_or(Method::Whole);
-            let water = self.water.get_or_insert_with(|| method.within(limits));
-            let water = choose(&mut **water, sea, &view, &mut self.water_drawing)?;
+            let water = if self.flight.is_some() {
+                let started = Instant::now();
+                // No height is late: a frame is the same, whichever were drawn before it.
+                let flight = self.water_flight.get_or_insert_with(|| RoamSea::new(limits).with_lateness(0.0));
+                let reached = flight.update(sea, &view, &mut || false).map_err(refused)?;
+                Told::of(reached, flight.mesh().triangles.len(), started)
+            } else {
+                let method = self.detail.lod.unwrap_or(Method::Whole);
+                let water = self.water.get_or_insert_with(|| method.within(limits));
+                choose(&mut **water, sea, &view, &mut self.water_drawing)?
+            };
             told.triangles += water.triangles;
             told.join(water);
         }
@@ -235,11 +246,16 @@ impl Chooser<'_> {
         self.flight.as_ref().map_or(&self.ground_drawing.mesh, RoamFlight::mesh)
     }
 
+    /// That of the sea.
+    fn water(&self) -> &Mesh {
+        self.water_flight.as_ref().map_or(&self.water_drawing.mesh, RoamSea::mesh)
+    }
+
     /// What was chosen last.
     fn meshes(&self) -> Meshes<'_> {
         Meshes {
             ground: Some(self.ground()),
-            water: self.shows_water.then_some(&self.water_drawing.mesh),
+            water: self.shows_water.then(|| self.water()),
             wireframe: self.detail.wireframe,
         }
     }

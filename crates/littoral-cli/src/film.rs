@@ -38,6 +38,8 @@ pub struct Order<'a> {
     pub field: f64,
     /// Pixels of a frame.
     pub size: UVec2,
+    /// The view that meshes are chosen for, if not that of each frame.
+    pub frozen: Option<View>,
 }
 
 #[derive(Serialize)]
@@ -121,7 +123,8 @@ impl Order<'_> {
                     sea.set_time(begin + time);
                 }
                 let (sea, view) = (sea.as_deref(), view(time, self.size));
-                if let Some(told) = drawer.choose(sea.filter(|_| stage.shows_waves()), &view)? {
+                let chosen_for = self.frozen.as_ref().unwrap_or(&view);
+                if let Some(told) = drawer.choose(sea.filter(|_| stage.shows_waves()), chosen_for)? {
                     mesh.get_or_insert(Told { select_seconds: 0.0, ..told }).join(told);
                 }
                 let picture = drawer.picture(stage, sea, &view, settings, &|_| {})?;

@@ -245,7 +245,11 @@ impl Render {
         let stage = Stage::new(&scene);
         let mut sea = self.waves(state.as_ref(), &subject, talk)?;
         let settings = Settings { samples: self.samples, seed: self.seed, passes: !self.passes.is_empty() };
-        if let Some(film) = film {
+        if let Some(mut film) = film {
+            if self.detail.lod_from.is_some() {
+                let shot = View::looking_at(shot.view.eye, look, film.field as f32, film.size);
+                film.frozen = Some(self.detail.view(&self, &subject, &shot, look, talk)?);
+            }
             let prepared = self.detail.prepare(stage.land());
             let chooser = self.detail.chooser(stage.land(), prepared.as_ref());
             let drawer = Drawer { chooser, painter: self.detail.painter(&stage, sea.as_ref(), talk)? };
@@ -339,6 +343,7 @@ impl Render {
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,
+            frozen: None,
         })
     }
 

@@ -81,12 +81,31 @@ fn films_of_meshes_are_drawn_frame_by_frame() {
     }
 }
 
+/// The mesh stays that of one eye, on land and sea, while the film's camera flies.
+#[test]
+fn a_film_of_a_frozen_mesh() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let film = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        std::fs::create_dir_all(&out).expect("a folder");
+        let film = ["render", "--path", "orbit", "--seconds", "3", "--fps", "1", "--size", "64x36", "--samples", "1"];
+        let mesh = ["--lod", "roam", "--tolerance", "6", "--out"];
+        let answer = json(&[&film[..], &mesh, &[&out.display().to_string()], more].concat());
+        let frame = std::fs::read(out.join("frame_00003.png")).expect("a frame");
+        (answer["triangles"].as_u64().expect("a number"), answer["bound_pixels"].as_f64().expect("a number"), frame)
+    };
+    let (_, _, flown) = film("flown", &[]);
+    let (near, bound, frozen) = film("near", &["--lod-from", "3380,560,175"]);
+    let (far, _, other) = film("far", &["--lod-from", "3380,-90000,60000"]);
+    assert!(far < near && bound <= 6.0, "{far} triangles from afar, {near} from near");
+    assert!(frozen != flown && frozen != other, "each mesh is of its own eye");
+}
+
 #[test]
 fn what_makes_no_mesh_is_refused() {
     fails(&["render", "--lod", "quadtree", "--tolerance", "0"], 2, "expected 0.001 to 1000000 pixels, got 0");
     fails(&["render", "--lod", "quadtree", "--tolerance", "nan"], 2, "expected 0.001");
     fails(&["render", "--lod", "quadtree", "--triangles", "0"], 2, "--triangles");
     fails(&["render", "--wireframe"], 2, "--lod <METHOD>");
-    fails(&["render", "--lod", "quadtree", "--lod-from", "1,2,3", "--path", "orbit"], 2, "cannot be used with");
     fails(&["render", "--lod", "clipmap"], 2, "[possible values: whole, nested, quadtree, patches, strips, roam]");
 }

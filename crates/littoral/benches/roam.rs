@@ -11,10 +11,11 @@ mod scene;
 use clock::{median, processor_time};
 use glam::{DVec2, DVec3, UVec2, Vec2, Vec3};
 use littoral::field::{Land, Raster, Sea, coast};
-use littoral::lod::{Drawing, Limits, Lod, Mesh, NestedBounds, Priority, Roam, RoamFlight, RoamOnce};
+use littoral::lod::{Drawing, Limits, Lod, Mesh, NestedBounds, Priority, Roam, RoamFlight, RoamOnce, RoamSea};
 use littoral::space::{Datum, View};
 use littoral::waves::{Depths, Length, Path, Peachey, Sine, Sines, StillWater, Superposition, Surf, Swell};
 use std::hint::black_box;
+use std::time::Instant;
 
 fn main() {
     let asked: Vec<String> = std::env::args().skip(1).filter(|arg| !arg.starts_with('-')).collect();
@@ -240,16 +241,58 @@ impl Scene<'_> {
     }
 }
 
-/// The sea of `littoral bench lod`, from scratch.
+/// Seas that move: the 128 waves of `littoral bench lod`, and tiles.
 fn sea() {
     let datum = Datum::Plane { origin: DVec2::splat(-1500.0), size: DVec2::splat(3000.0) };
     let waves = Superposition::of_state(&coast::sea_state(), 16, 8).expect("a sea");
-    let mut sea = Sea::new(datum, 0.0).with(Box::new(waves));
-    let eye = DVec3::new(-500.0, -800.0, 25.0);
+    over_sea("128 waves", Sea::new(datum, 0.0).with(Box::new(waves)));
+    over_sea("tiles", Sea::of_state(datum, 0.0, &coast::sea_state()).expect("a sea"));
+}
+
+/// The view of a flight over the sea at 20 m/s.
+fn over_waves(time: f64) -> View {
+    let eye = DVec3::new(-500.0 + 20.0 * time, -800.0, 25.0);
     let target = eye + DVec3::new(300.0, 900.0, -120.0);
     let mut view = View::looking_at(eye, target, 60f32.to_radians(), UVec2::new(1280, 720));
     view.tolerance_pixels = 1.0;
+    view
+}
+
+fn over_sea(name: &str, mut sea: Sea) {
+    let view = over_waves(0.0);
     for triangles in [100_000, 1_000_000] {
+        for lateness in [0.0, 0.25] {
+            let mut flight = RoamSea::new(Limits { finest: 12, triangles }).with_lateness(lateness);
+            let (mut ms, mut waited, mut asked) = (Vec::new(), Vec::new(), Vec::new());
+            let mut pixels = 0.0f32;
+            for frame in 0..90 {
+                let time = f64::from(frame) / 60.0;
+                sea.set_time(time);
+                let begin = Instant::now();
+                let reached = flight.update(&sea, &over_waves(time), &mut || false).expect("a view");
+                let all = begin.elapsed().as_secs_f64() * 1e3;
+                let (heights, seconds) = flight.heights_asked();
+                // The first frames come from nothing, and all at once.
+                if frame >= 30 {
+                    ms.push(all - seconds * 1e3);
+                    waited.push(seconds * 1e3);
+                    asked.push(heights as f64);
+                    pixels = pixels.max(reached.pixels);
+                }
+            }
+            [&mut ms, &mut waited, &mut asked].into_iter().for_each(|all| all.sort_by(f64::total_cmp));
+            println!(
+                "{name}, {} triangles from frame to frame, lateness {lateness}: choice {:.2} / {:.2} ms, heights {:.2} / {:.2} ms (median / 99 %, by the \
+                 wall), {:.0} of {} asked a frame, {pixels:.2} pixels reached",
+                flight.mesh().triangles.len(),
+                ms[30],
+                ms[59],
+                waited[30],
+                waited[59],
+                asked[30],
+                flight.mesh().vertices.len()
+            );
+        }
         let mut roam = Roam::new(Limits { finest: 12, triangles });
         let mut drawing = Drawing::default();
         let mut time = 0.0;
@@ -259,7 +302,7 @@ fn sea() {
             roam.select(&sea, &view, &mut drawing).expect("a view");
         });
         println!(
-            "a moving sea, {} triangles from scratch: {:.0} ms of processor time",
+            "{name}, {} triangles from scratch: {:.0} ms of processor time, heights included",
             drawing.mesh.triangles.len(),
             seconds * 1e3
         );

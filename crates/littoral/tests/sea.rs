@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3, UVec2, Vec3};
 use littoral::field::{HeightField, Land, Raster, Sea, Surface, Water, coast};
 use littoral::picture::{Scene, Settings, Sun, render};
 use littoral::space::{Cell, Datum, Place, View};
-use littoral::waves::{SeaState, StillWater, Superposition, components};
+use littoral::waves::{Length, SeaState, Sine, Sines, StillWater, Superposition, components};
 
 /// A sea of long waves only, so that a picture shows all of them.
 fn long_waves(seed: u64) -> Superposition {
@@ -174,4 +174,39 @@ fn a_bed_takes_every_state() {
     let coast = coast::coast();
     let water = Water::flood(&coast, 0.0).expect("the sea");
     Sea::over(&coast, &water, &"beaufort=3".parse().expect("a state"), &|_| true).expect("a sea");
+}
+
+#[test]
+fn no_height_changes_faster_than_is_said() {
+    let places: Vec<DVec2> = (0..40_000).map(|i| DVec2::new(f64::from(i % 200), f64::from(i / 200)) * 3.7).collect();
+    let sum =
+        |seed| Superposition::of_state(&SeaState { seed, ..SeaState::beaufort(6.0, 0.3).expect("a number") }, 16, 8);
+    let sine =
+        |steepness: f64| Sine { amplitude: 0.8, length: Length::Wavelength(30.0), heading: 0.4, phase: 0.0, steepness };
+    let sines = |steepness| Sines::new(&[sine(steepness)], StillWater::DEEP).expect("waves");
+    let sea = || Sea::new(datum(), 3.0);
+    let still = sea();
+    assert_eq!(still.rise_speed(), 0.0);
+    let state = SeaState::beaufort(5.0, 0.3).expect("a number");
+    // How much more may be said than is seen: waves of a sum may all meet, but do not here.
+    for (name, mut sea, slack) in [
+        ("one sine", sea().with(Box::new(sines(0.0))), 1.01),
+        ("one trochoid", sea().with(Box::new(sines(0.5))), 1.5),
+        ("128 waves", sea().with(Box::new(sum(1).expect("a sea"))), 7.0),
+        ("tiles", Sea::of_state(datum(), 3.0, &state).expect("a sea"), 2.5),
+    ] {
+        let said = f64::from(sea.rise_speed());
+        let (mut before, mut now) = (vec![0.0; places.len()], vec![0.0; places.len()]);
+        let mut most = 0.0f64;
+        for second in 0..10 {
+            for (time, heights) in [(0.0, &mut before), (0.02, &mut now)] {
+                sea.set_time(f64::from(second) + time);
+                sea.heights_at(&places, heights);
+            }
+            most = before.iter().zip(&now).fold(most, |most, (a, b)| most.max((a - b).abs() / 0.02));
+        }
+        // Each height may be off by what the search for it leaves.
+        assert!(most <= said + 0.06, "{name}: {most} m/s where {said} was said");
+        assert!(said < slack * most, "{name}: {said} m/s said, {most} seen");
+    }
 }

@@ -9,11 +9,12 @@ use crate::talk::{Failure, Talk, progress, tidy};
 use counted::Counted;
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::{HeightField, Land, Sea, coast};
-use littoral::lod::{Drawing, Limits, Mesh, Method, NestedBounds, RoamFlight};
+use littoral::lod::{Drawing, Limits, Mesh, Method, NestedBounds, RoamFlight, RoamSea};
 use littoral::picture::mesh_errors;
 use littoral::space::{Datum, View};
 use littoral::waves::Superposition;
 use serde::Serialize;
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -51,12 +52,42 @@ const SWEPT: (u32, f64) = (4, 8.0);
 /// A surface and how a camera moves over it.
 struct Flight<'a> {
     name: &'static str,
-    field: &'a dyn HeightField,
+    over: Over<'a>,
     finest: u8,
-    /// What ROAM prepares to go on from frame to frame, over land.
-    bounds: Option<&'a NestedBounds>,
     /// Eye and target at an instant (s).
     camera: Box<dyn Fn(f64) -> (DVec3, DVec3) + 'a>,
+}
+
+/// What is flown over.
+#[derive(Clone, Copy)]
+enum Over<'a> {
+    /// Land, and what ROAM prepares to go on from frame to frame.
+    Land(&'a Land, &'a NestedBounds),
+    /// A sea that moves.
+    Sea(&'a RefCell<Sea>),
+}
+
+/// ROAM that goes on from frame to frame, with the mesh in place.
+enum Going<'a> {
+    Land(RoamFlight<'a>),
+    Sea(RoamSea),
+}
+
+impl Going<'_> {
+    fn mesh(&self) -> &Mesh {
+        match self {
+            Going::Land(flight) => flight.mesh(),
+            Going::Sea(flight) => flight.mesh(),
+        }
+    }
+
+    /// Heights that the last frame asked for, and how long that took (s).
+    fn heights(&self) -> (usize, f64) {
+        match self {
+            Going::Land(flight) => (flight.changed_vertices().map(|range| range.len()).sum(), 0.0),
+            Going::Sea(flight) => flight.heights_asked(),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -78,7 +109,7 @@ struct Row {
     tolerance_pixels: f64,
     triangles: usize,
     vertices: usize,
-    /// Heights that the field was asked for, in a frame; of ROAM in flight, those that changed.
+    /// Heights that the field was asked for, in a frame; of ROAM in flight over land, those that changed.
     heights_evaluated: usize,
     bound_pixels: f32,
     error_max_pixels: f32,
@@ -113,7 +144,7 @@ impl Lod {
         // The sea of 2009: 16 frequencies in 8 directions.
         let waves = Superposition::of_state(&coast::sea_state(), 16, 8)
             .map_err(|e| Failure::Work(format!("the sea of the measurement: {e}")))?;
-        let sea = Sea::new(datum, 0.0).with(Box::new(waves));
+        let sea = RefCell::new(Sea::new(datum, 0.0).with(Box::new(waves)));
         counted::count();
         let bar = progress(2, "preparing");
         let prepare = |land: &Land| {
@@ -125,15 +156,20 @@ impl Lod {
         bar.finish_and_clear();
         let flights = flights(&mountains, &coast, &sea, &bounds);
         let runs = if self.plot.is_some() { 1 + SWEEP.len() } else { 1 };
-        let bar = progress((flights.len() * Method::ALL.len() * runs) as u64, "flying");
+        let bar = progress((flights.len() * Method::ALL.len() * runs + 1) as u64, "flying");
         let (mut rows, mut sweep) = (Vec::new(), Vec::new());
         for flight in &flights {
             for method in Method::ALL {
-                rows.push(self.fly(flight, method, self.tolerance, self.frames, LONGEST)?);
+                rows.push(self.fly(flight, method, true, self.tolerance, self.frames, LONGEST)?);
                 bar.inc(1);
+                if method == Method::Roam && matches!(flight.over, Over::Sea(_)) {
+                    rows.push(self.fly(flight, method, false, self.tolerance, self.frames, LONGEST)?);
+                    bar.inc(1);
+                }
                 for factor in SWEEP.iter().filter(|_| self.plot.is_some()) {
                     let (frames, longest) = SWEPT;
-                    sweep.push(self.fly(flight, method, self.tolerance * factor, frames.min(self.frames), longest)?);
+                    let (tolerance, frames) = (self.tolerance * factor, frames.min(self.frames));
+                    sweep.push(self.fly(flight, method, true, tolerance, frames, longest)?);
                     bar.inc(1);
                 }
             }
@@ -153,13 +189,25 @@ impl Lod {
         if talk.json() { talk.print_json(answer) } else { talk.print(answer.table()) }
     }
 
-    /// Flies a method for so many frames, and for so long (s).
-    fn fly(&self, flight: &Flight, method: Method, tolerance: f64, frames: u32, longest: f64) -> Result<Row, Failure> {
+    /// Flies a method for so many frames, and for so long (s). What can go on from frame to frame does so, if it `goes_on`.
+    fn fly(
+        &self,
+        flight: &Flight,
+        method: Method,
+        goes_on: bool,
+        tolerance: f64,
+        frames: u32,
+        longest: f64,
+    ) -> Result<Row, Failure> {
         let limits = Limits { finest: flight.finest, triangles: self.triangles as usize };
         let mut lod = method.within(limits);
-        // Over land ROAM goes on from frame to frame, with the mesh in place.
-        let mut roam = flight.bounds.filter(|_| method == Method::Roam).map(|bounds| RoamFlight::over(bounds, limits));
-        let prepared = flight.bounds.filter(|_| method == Method::Roam).map_or(0, NestedBounds::bytes);
+        let (mut roam, prepared) = match flight.over {
+            Over::Land(_, bounds) if method == Method::Roam && goes_on => {
+                (Some(Going::Land(RoamFlight::over(bounds, limits))), bounds.bytes())
+            }
+            Over::Sea(_) if method == Method::Roam && goes_on => (Some(Going::Sea(RoamSea::new(limits))), 0),
+            _ => (None, 0),
+        };
         let mut drawing = Drawing::default();
         let (mut select, mut expand) = (Vec::new(), Vec::new());
         let (mut triangles, mut vertices) = (Vec::new(), Vec::new());
@@ -176,23 +224,40 @@ impl Lod {
             let (eye, target) = (flight.camera)(f64::from(frame) / 60.0);
             let view =
                 View { tolerance_pixels: tolerance as f32, ..View::looking_at(eye, target, 50f32.to_radians(), FRAME) };
+            // That the sea moves on is paid for by whoever shows it, not by a method.
+            let time = f64::from(frame) / 60.0;
+            let sea = match flight.over {
+                Over::Sea(sea) => {
+                    sea.borrow_mut().set_time(time);
+                    Some(sea.borrow())
+                }
+                Over::Land(..) => None,
+            };
+            let field: &dyn HeightField = match (&sea, flight.over) {
+                (Some(sea), _) => &**sea,
+                (None, Over::Land(land, _)) => land,
+                (None, Over::Sea(_)) => unreachable!("a sea was borrowed"),
+            };
             let start = Instant::now();
-            let reached = match &mut roam {
-                Some(roam) => roam.update(&view, &mut || false),
-                None => lod.select(flight.field, &view, &mut drawing),
+            let reached = match (&mut roam, &sea) {
+                (Some(Going::Land(roam)), _) => roam.update(&view, &mut || false),
+                (Some(Going::Sea(roam)), Some(sea)) => roam.update(sea, &view, &mut || false),
+                _ => lod.select(field, &view, &mut drawing),
             };
             let reached = reached.map_err(|e| Failure::Work(e.to_string()))?;
             let chosen = Instant::now();
-            match &roam {
-                Some(_) => expand.push(0.0),
+            let heights = match &roam {
+                Some(roam) => roam.heights().1,
                 None => {
-                    drawing.expand(flight.field);
-                    expand.push(chosen.elapsed().as_secs_f64() * 1e3);
+                    drawing.expand(field);
+                    chosen.elapsed().as_secs_f64()
                 }
-            }
+            };
             // The first frame comes from nothing.
             if frame > 0 || frames < 3 {
-                select.push((chosen - start).as_secs_f64() * 1e3);
+                let within = if roam.is_some() { heights } else { 0.0 };
+                select.push(((chosen - start).as_secs_f64() - within) * 1e3);
+                expand.push(heights * 1e3);
             }
             if let Some(roam) = &roam {
                 drawing.mesh.clone_from(roam.mesh());
@@ -204,17 +269,24 @@ impl Lod {
             let measured = frame % stride == 1 % stride && (frames >= MEASURED * 4 || errors.is_empty());
             if measured {
                 evaluated.push(match &roam {
-                    Some(roam) => roam.changed_vertices().map(|range| range.len()).sum(),
+                    Some(roam) => roam.heights().0,
                     None => {
-                        let counted = Counted::new(flight.field);
+                        let counted = Counted::new(field);
                         lod.select(&counted, &view, &mut drawing).map_err(|e| Failure::Work(e.to_string()))?;
                         drawing.expand(&counted);
                         counted.heights_asked()
                     }
                 });
-                // Both meshes from the same eye: what moves is the change of mesh alone.
-                let now = mesh_errors(&drawing.mesh, flight.field, &view);
-                let then = mesh_errors(&before, flight.field, &view);
+                // Both meshes from the same eye, each against the surface of its own instant: what moves is the change of mesh alone.
+                let now = mesh_errors(&drawing.mesh, field, &view);
+                drop(sea);
+                let then = match flight.over {
+                    Over::Land(land, _) => mesh_errors(&before, land, &view),
+                    Over::Sea(sea) => {
+                        sea.borrow_mut().set_time((time - 1.0 / 60.0).max(0.0));
+                        mesh_errors(&before, &*sea.borrow(), &view)
+                    }
+                };
                 let jumps = now.iter().zip(&then).map(|(now, then)| (now - then).abs());
                 pop = jumps.fold(pop, f32::max);
                 errors.extend(now.iter().filter(|e| !e.is_nan()).map(|e| e.abs()));
@@ -236,7 +308,7 @@ impl Lod {
         let triangle_count = triangles[at(0.5, triangles.len())];
         Ok(Row {
             flight: flight.name,
-            method: method.to_string(),
+            method: if goes_on { method.to_string() } else { format!("{method} anew") },
             tolerance_pixels: tolerance,
             triangles: triangle_count,
             vertices: vertex_count,
@@ -257,7 +329,12 @@ impl Lod {
 }
 
 /// Low over mountains, high above them, along the coast, and over the open sea.
-fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea, bounds: &'a [NestedBounds; 2]) -> Vec<Flight<'a>> {
+fn flights<'a>(
+    mountains: &'a Land,
+    coast: &'a Land,
+    sea: &'a RefCell<Sea>,
+    bounds: &'a [NestedBounds; 2],
+) -> Vec<Flight<'a>> {
     let ground = |land: &Land, at: DVec2| f64::from(land.height_at(at).unwrap_or(0.0)).max(0.0);
     let over = move |land: &'a Land, from: DVec2, to: DVec2, speed: f64, above: f64, down: f64| {
         let ahead = (to - from).normalize();
@@ -277,9 +354,8 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea, bounds: &'a [
     vec![
         Flight {
             name: "low over mountains, 100 m/s",
-            field: mountains,
+            over: Over::Land(mountains, &bounds[0]),
             finest,
-            bounds: Some(&bounds[0]),
             camera: Box::new(over(
                 mountains,
                 low + extent * 0.3,
@@ -291,9 +367,8 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea, bounds: &'a [
         },
         Flight {
             name: "high above them, 250 m/s",
-            field: mountains,
+            over: Over::Land(mountains, &bounds[0]),
             finest,
-            bounds: Some(&bounds[0]),
             camera: Box::new(over(
                 mountains,
                 low + extent * 0.2,
@@ -305,9 +380,8 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea, bounds: &'a [
         },
         Flight {
             name: "along the coast, 50 m/s",
-            field: coast,
+            over: Over::Land(coast, &bounds[1]),
             finest: coast.finest_level(),
-            bounds: Some(&bounds[1]),
             camera: Box::new(over(
                 coast,
                 south + size * DVec2::new(0.3, 0.35),
@@ -319,9 +393,8 @@ fn flights<'a>(mountains: &'a Land, coast: &'a Land, sea: &'a Sea, bounds: &'a [
         },
         Flight {
             name: "over the sea, 20 m/s",
-            field: sea,
+            over: Over::Sea(sea),
             finest: 12,
-            bounds: None,
             camera: Box::new(|t| {
                 let eye = DVec3::new(-500.0 + 20.0 * t, -800.0, 25.0);
                 (eye, eye + DVec3::new(300.0, 900.0, -120.0))

@@ -358,6 +358,25 @@ impl Sea {
         }
     }
 
+    /// Greatest vertical distance (m) from the surface to a triangle over it, anywhere, that fits into a circle of a diameter (m).
+    pub(crate) fn triangle_error(&self, diameter: f32) -> f32 {
+        let b = &self.bounds;
+        let mut error = (2.0 * b.height).min(self.steepest() * diameter);
+        if b.stretch < 1.0 {
+            // Second derivatives through the inverse map, and a triangle no point of which is farther than the circle's radius from its
+            // nearest corner: |f − f_drawn| ≤ κ (diameter / 2)² / 2.
+            let left = 1.0 - b.stretch;
+            let curvature = b.curvature / (left * left) + b.slope * b.bend / (left * left * left);
+            error = error.min(0.125 * curvature * diameter * diameter);
+        }
+        error + 2.0 * Sea::TOLERANCE * b.slope.min(1.0) + 4e-7 * (self.level.abs() as f32 + b.height)
+    }
+
+    /// How fast (m/s) the surface goes up or down at a place, at most: see [`WaveModel::rise_speed`].
+    pub fn rise_speed(&self) -> f32 {
+        self.models.iter().map(|model| model.rise_speed()).sum()
+    }
+
     /// Greatest slope of the surface, infinite where waves may fold.
     fn steepest(&self) -> f32 {
         let b = &self.bounds;
@@ -394,17 +413,7 @@ impl HeightField for Sea {
     }
 
     fn error(&self, cell: Cell) -> f32 {
-        let b = &self.bounds;
-        let diagonal = (cell.side() * self.datum.metres_per_uv(cell.centre())).length() as f32;
-        let mut error = (2.0 * b.height).min(self.steepest() * diagonal);
-        if b.stretch < 1.0 {
-            // Second derivatives through the inverse map, and a triangle no point of which is farther than half the diagonal from a corner's
-            // circle: |f − f_drawn| ≤ κ (diagonal / 2)² / 2.
-            let left = 1.0 - b.stretch;
-            let curvature = b.curvature / (left * left) + b.slope * b.bend / (left * left * left);
-            error = error.min(0.125 * curvature * diagonal * diagonal);
-        }
-        error + 2.0 * Sea::TOLERANCE * b.slope.min(1.0) + 4e-7 * (self.level.abs() as f32 + b.height)
+        self.triangle_error((cell.side() * self.datum.metres_per_uv(cell.centre())).length() as f32)
     }
 
     fn stencil_error(&self, cell: Cell, depth: u8) -> f32 {

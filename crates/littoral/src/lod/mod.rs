@@ -28,7 +28,7 @@ pub use metric::{Bounds, ScreenMetric, ViewError};
 pub use nested::{Nested, Seams};
 pub use patches::Patches;
 pub use quadtree::Quadtree;
-pub use roam::{Disc, Factors, NestedBounds, Priority, Roam, RoamFlight, RoamOnce, TooManySamples};
+pub use roam::{Disc, Factors, NestedBounds, Priority, Roam, RoamFlight, RoamOnce, RoamSea, TooManySamples, Waves};
 pub use strips::Strips;
 pub use whole::Whole;
 

@@ -23,12 +23,13 @@ mod bounds;
 mod diamond;
 mod factors;
 mod flight;
+mod ground;
 mod scan;
 mod scratch;
 
 pub use bounds::{NestedBounds, TooManySamples};
 pub use factors::{Disc, Factors};
-pub use flight::RoamFlight;
+pub use flight::{RoamFlight, RoamSea, Waves};
 pub use scan::Priority;
 pub use scratch::RoamOnce;
 

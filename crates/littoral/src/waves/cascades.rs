@@ -229,4 +229,8 @@ impl WaveModel for Cascades {
         let bounds = self.bounds();
         ((6.0 * libm::sqrt(variance)) as f32).min(bounds.height.max(bounds.sideways))
     }
+
+    fn rise_speed(&self) -> f32 {
+        (6.0 * libm::sqrt(self.patches.iter().map(Patch::variance_of_rising).sum::<f64>())) as f32
+    }
 }

@@ -146,6 +146,12 @@ pub trait WaveModel: Any + Send + Sync {
     /// to 0 with the wavelength.
     fn roughness(&self, wavelength: f32) -> f32;
 
+    /// How fast (m/s) its surface goes up or down at a place that stays, at most: what a height that is a while old is off by. All but never passed
+    /// where waves are random (six standard deviations); infinite for models that do not know.
+    fn rise_speed(&self) -> f32 {
+        f32::INFINITY
+    }
+
     /// How high (m) above still water its waves run up a beach at a place (m), at most; 0 for models that know of none.
     fn run_up(&self, _at: DVec2) -> f32 {
         0.0

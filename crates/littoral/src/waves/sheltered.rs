@@ -181,6 +181,10 @@ impl WaveModel for Sheltered {
     fn roughness(&self, wavelength: f32) -> f32 {
         self.model.roughness(wavelength)
     }
+
+    fn rise_speed(&self) -> f32 {
+        self.model.rise_speed()
+    }
 }
 
 #[cfg(test)]

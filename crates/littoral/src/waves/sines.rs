@@ -153,6 +153,10 @@ impl WaveModel for Sines {
     fn roughness(&self, wavelength: f32) -> f32 {
         self.sum.roughness(wavelength)
     }
+
+    fn rise_speed(&self) -> f32 {
+        self.sum.rise_speed()
+    }
 }
 
 #[cfg(test)]

@@ -281,6 +281,20 @@ impl Sum {
         self.bounds
     }
 
+    /// How fast the surface goes up or down at a place that stays, at most: as fast as its water does, and as its slopes are pushed by.
+    pub(crate) fn rise_speed(&self) -> f32 {
+        let (up, aside) = self.waves.iter().fold((0.0, 0.0), |(up, aside), Pushing { wave, push }| {
+            let speed = wave.amplitude * wave.angular_frequency;
+            (up + speed, aside + push * speed)
+        });
+        let b = &self.bounds;
+        match aside {
+            0.0 => (up * (1.0 + 1e-5)) as f32,
+            _ if b.stretch < 1.0 => ((up + aside * f64::from(b.slope / (1.0 - b.stretch))) * (1.0 + 1e-5)) as f32,
+            _ => f32::INFINITY,
+        }
+    }
+
     /// Greatest height or push of the waves shorter than `wavelength` (m).
     pub(crate) fn roughness(&self, wavelength: f32) -> f32 {
         match self.rough.partition_point(|[length, _]| *length < wavelength) {

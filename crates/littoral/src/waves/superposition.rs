@@ -123,4 +123,8 @@ impl WaveModel for Superposition {
     fn roughness(&self, wavelength: f32) -> f32 {
         self.sum.roughness(wavelength)
     }
+
+    fn rise_speed(&self) -> f32 {
+        self.sum.rise_speed()
+    }
 }

@@ -11,6 +11,7 @@ mod counting;
 mod grids;
 mod memory;
 mod roam;
+mod roam_sea;
 mod surfaces;
 
 use check::{Case, check};

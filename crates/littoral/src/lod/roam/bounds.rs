@@ -29,6 +29,9 @@ pub(super) struct Bound {
 impl Bound {
     const EMPTY: Bound = Bound { bits: 0b1100, low: u16::MAX, high: 0 };
 
+    /// Of a diamond that is whole, and all else of which is known from its level.
+    pub(super) const WATER: Bound = Bound { bits: 0b0011, low: 0, high: 0 };
+
     pub(super) fn new(deviation: f32, low: u16, high: u16, cover: [Cover; 2]) -> Bound {
         let mark = |side: usize| match cover[side] {
             Cover::Whole => 1 << side,

@@ -7,7 +7,7 @@
 //!
 //! Works this rests on: M. Duchaineau et al., "ROAMing terrain: real-time optimally adapting meshes", 1997 (the list of factors); spec page of 1999.
 
-use super::scan::{Extent, Item, Lens};
+use super::scan::{Extent, Item};
 use glam::DVec2;
 
 /// Factors of priority; by default all are off. With any of them on, priorities are no pixels any more but weighed pixels, and it is those that the
@@ -111,11 +111,11 @@ impl Weights {
     }
 
     /// Multiplies priorities by factors.
-    pub(super) fn weigh(&self, lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {
+    pub(super) fn weigh(&self, extent: impl Fn(&Item) -> Extent, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {
         for ((item, &slopes), out) in items.iter().zip(slopes).zip(out) {
             // What is not there has no number, what is not seen none that a factor changes.
             if out.abs() > 0.0 {
-                *out *= self.of(&lens.extent(item), slopes);
+                *out *= self.of(&extent(item), slopes);
             }
         }
     }

@@ -15,26 +15,32 @@
 //! Works this rests on: M. Duchaineau et al., "ROAMing terrain: real-time optimally adapting meshes", 1997; P. Lindstrom and V. Pascucci,
 //! "Terrain simplification simplified", 2002 (nesting).
 
+#![allow(private_bounds, reason = "what is flown over is one of two kinds, each with a name of its own")]
+
 use super::CORNERS;
 use super::bounds::{Bound, NestedBounds};
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
 use super::factors::Factors;
+use super::ground::Ground;
 use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use super::scratch::Search;
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
 use crate::memory::push;
 use crate::space::{Place, View};
 use glam::DVec2;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 mod drawn;
 mod foresight;
 mod queues;
+mod sea;
 #[cfg(test)]
 mod tests;
 
 use drawn::Changes;
 use queues::{Key, Queue};
+pub use sea::{RoamSea, Waves};
 
 const NONE: u32 = u32::MAX;
 
@@ -62,10 +68,11 @@ struct Record {
     kids: u8,
 }
 
-/// ROAM over prepared land, from view to view.
+/// ROAM over prepared land, from view to view; over a sea it is [`RoamSea`](super::RoamSea).
 #[derive(Clone, Debug)]
-pub struct RoamFlight<'a> {
-    bounds: &'a NestedBounds,
+pub struct RoamFlight<'a, G = &'a NestedBounds> {
+    bounds: G,
+    over: PhantomData<&'a ()>,
     /// Where refinement ends though the tolerance is not met.
     pub limits: Limits,
     /// What comes first.
@@ -101,17 +108,36 @@ pub struct RoamFlight<'a> {
     operations: (u64, u64),
 }
 
-const _: () = assert!(RoamFlight::MOST / 2 * 3 < 1 << Item::RECORD_BITS);
+/// The most triangles.
+const MOST: usize = 20_000_000;
+
+const _: () = assert!(MOST / 2 * 3 < 1 << Item::RECORD_BITS);
 
 impl<'a> RoamFlight<'a> {
     /// The most triangles that a flight draws, whatever its limits: entries of its list name records by 25 bits, and a mesh of n triangles takes no more than 1.5 n
     /// records.
-    pub const MOST: usize = 20_000_000;
+    pub const MOST: usize = MOST;
 
     /// A flight over prepared land, with nothing drawn yet.
     pub fn over(bounds: &'a NestedBounds, limits: Limits) -> RoamFlight<'a> {
+        RoamFlight::on(bounds, limits)
+    }
+
+    /// Changes the mesh into that of `view`. `stop` is asked between steps; when it says yes the mesh is left as it is then: conforming, and as near to
+    /// the one wanted as the most urgent steps brought it.
+    ///
+    /// # Errors
+    /// If the view is not one that a picture can be drawn of.
+    pub fn update(&mut self, view: &View, stop: &mut dyn FnMut() -> bool) -> Result<Reached, ViewError> {
+        self.advance(view, stop)
+    }
+}
+
+impl<G: Ground> RoamFlight<'_, G> {
+    fn on(bounds: G, limits: Limits) -> Self {
         RoamFlight {
             bounds,
+            over: PhantomData,
             limits,
             priority: Priority::default(),
             factors: Factors::default(),
@@ -196,12 +222,8 @@ impl<'a> RoamFlight<'a> {
         self.records.clear();
     }
 
-    /// Changes the mesh into that of `view`. `stop` is asked between steps; when it says yes the mesh is left as it is then: conforming, and as near to
-    /// the one wanted as the most urgent steps brought it.
-    ///
-    /// # Errors
-    /// If the view is not one that a picture can be drawn of.
-    pub fn update(&mut self, view: &View, stop: &mut dyn FnMut() -> bool) -> Result<Reached, ViewError> {
+    /// Changes the mesh into that of a view.
+    fn advance(&mut self, view: &View, stop: &mut dyn FnMut() -> bool) -> Result<Reached, ViewError> {
         let metric = ScreenMetric::new(view, self.bounds.datum())?;
         self.lens = Some(self.bounds.lens(&metric, self.priority, &self.factors));
         self.tolerance = self.priority.tolerance(&metric);
@@ -216,7 +238,7 @@ impl<'a> RoamFlight<'a> {
             let groups = self.groups.max(1) as usize;
             let turn = self.turn as usize % groups;
             let n = self.list.len();
-            self.list.measure(lens, n * turn / groups..n * (turn + 1) / groups);
+            self.list.measure(&self.bounds, lens, n * turn / groups..n * (turn + 1) / groups);
             self.turn = self.turn.wrapping_add(1);
         }
         let stopped = self.balance(stop);
@@ -250,7 +272,7 @@ impl<'a> RoamFlight<'a> {
 
     /// The most triangles.
     fn budget(&self) -> usize {
-        self.limits.triangles.clamp(2, RoamFlight::MOST)
+        self.limits.triangles.clamp(2, MOST)
     }
 
     /// The level of cells that are not split any more.
@@ -289,9 +311,9 @@ impl<'a> RoamFlight<'a> {
     fn join(&mut self, record: u32, kind: u8) {
         let known = &self.records[record as usize];
         let diamond = Diamond::at(known.at);
-        let item = self.bounds.item_of(known.bound, diamond, kind, record);
+        let item = self.bounds.item(known.bound, diamond, kind, record);
         let slopes = self.bounds.slopes(diamond);
-        let priority = self.lens.as_ref().map_or(0.0, |lens| lens.priority(&item, slopes));
+        let priority = self.lens.as_ref().map_or(0.0, |lens| self.bounds.priority(lens, &item, slopes));
         let place = self.list.add(item, slopes, priority);
         let known = &mut self.records[record as usize];
         (known.place, known.list) = (place, kind);
@@ -449,6 +471,7 @@ impl<'a> RoamFlight<'a> {
                 self.unused.push(child);
             }
         }
+        self.bounds.forget(known.triangles[0]);
         self.unused_vertices.push(known.triangles[0]);
         let own = &mut self.records[record as usize];
         (own.split, own.triangles, own.children) = (false, [NONE; 2], [NONE; 4]);

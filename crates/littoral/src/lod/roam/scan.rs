@@ -8,6 +8,7 @@
 use super::super::ScreenMetric;
 use super::bounds::prefetch;
 use super::factors::{Factors, Slopes, Weights};
+use super::ground::Ground;
 use crate::space::{Cell, Datum, View};
 use glam::DVec3;
 use multiversion::multiversion;
@@ -40,18 +41,18 @@ pub(super) struct Lens {
     rest: [f32; 2],
     height: f32,
     /// Height of step 0 and of one step (m).
-    base: f32,
-    step: f32,
+    pub(super) base: f32,
+    pub(super) step: f32,
     /// Metres a step.
     scale: [f32; 2],
     forward: [f32; 3],
     sides: [[f32; 3]; 4],
     focal: f32,
     stretch: f32,
-    priority: Priority,
+    pub(super) priority: Priority,
     /// Whether anything may be void.
     voids: bool,
-    weights: Option<Weights>,
+    pub(super) weights: Option<Weights>,
 }
 
 impl Lens {
@@ -214,10 +215,10 @@ impl List {
         self.items[place as usize].word >> (32 - Item::RECORD_BITS)
     }
 
-    /// The middle of an entry's base (steps).
-    pub(super) fn middle(&self, place: u32) -> [u32; 2] {
-        let at = self.items[place as usize].at;
-        [at & 0xffff, at >> 16]
+    /// An entry.
+    #[inline]
+    pub(super) fn item(&self, place: u32) -> &Item {
+        &self.items[place as usize]
     }
 
     /// Begins to load an entry.
@@ -246,8 +247,8 @@ impl List {
     }
 
     /// Measures all whose number lies in `part`.
-    pub(super) fn measure(&mut self, lens: &Lens, part: std::ops::Range<usize>) {
-        measure(lens, &self.items[part.clone()], &self.slopes[part.clone()], &mut self.numbers[part]);
+    pub(super) fn measure(&mut self, ground: &impl Ground, lens: &Lens, part: std::ops::Range<usize>) {
+        ground.measure(lens, &self.items[part.clone()], &self.slopes[part.clone()], &mut self.numbers[part]);
     }
 
     /// Greatest priority of what is not split.
@@ -279,7 +280,7 @@ pub(super) fn measure(lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut 
         Priority::InverseDistance => measure_distances(lens, items, out),
     }
     if let Some(weights) = &lens.weights {
-        weights.weigh(lens, items, slopes, out);
+        weights.weigh(|item| lens.extent(item), items, slopes, out);
     }
 }
 
@@ -309,7 +310,7 @@ fn measure_one_by_one<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items:
 
 /// The number kept of a priority that is not negative.
 #[inline(always)]
-fn marked(priority: f32, word: u32) -> f32 {
+pub(super) fn marked(priority: f32, word: u32) -> f32 {
     f32::from_bits(priority.to_bits() | word << 31)
 }
 
@@ -332,7 +333,12 @@ fn extent(lens: &Lens, at: u32, heights: u32, word: u32) -> Extent {
     let (x, y) = ((at & 0xffff) as i32, (at >> 16) as i32);
     let half = ((2 + (word >> 2 & 1)) << (word >> 3 & 15)) as i32;
     let (low, high) = ((heights & 0xffff) as i32, (heights >> 16) as i32);
-    let (low, high) = (lens.base + low as f32 * lens.step, lens.base + high as f32 * lens.step);
+    around(lens, [x, y], half, [lens.base + low as f32 * lens.step, lens.base + high as f32 * lens.step])
+}
+
+/// The box round a square, its middle and half its side in steps, between two heights (m).
+#[inline(always)]
+pub(super) fn around(lens: &Lens, [x, y]: [i32; 2], half: i32, [low, high]: [f32; 2]) -> Extent {
     let along = |x: i32, axis: usize| (x - lens.eye[axis]) as f32 * lens.scale[axis] - lens.rest[axis];
     Extent([
         [along(x - half, 0), along(x + half, 0)],
@@ -351,7 +357,18 @@ fn priority<const ERRORS: bool, const VOIDS: bool>(
     word: u32,
 ) -> f32 {
     let there = heights & 0xffff <= heights >> 16;
-    let Extent([[x0, x1], [y0, y1], [z0, z1]]) = extent(lens, at, heights, word);
+    priority_of_box::<ERRORS, VOIDS>(lens, extent(lens, at, heights, word), there, deviation)
+}
+
+/// The priority of what is in a box, if anything is there.
+#[inline(always)]
+pub(super) fn priority_of_box<const ERRORS: bool, const VOIDS: bool>(
+    lens: &Lens,
+    extent: Extent,
+    there: bool,
+    deviation: f32,
+) -> f32 {
+    let Extent([[x0, x1], [y0, y1], [z0, z1]]) = extent;
     let far_x = most(x0.abs(), x1.abs());
     let far_y = most(y0.abs(), y1.abs());
     let far_z = most(z0.abs(), z1.abs());

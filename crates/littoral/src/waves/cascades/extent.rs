@@ -4,6 +4,7 @@
 //! ones. For a side h = 3t, values and slopes at the ends of a line make the points f₀, f₀ + t x₀, f₁ − t x₁, f₁; the mixed derivatives are 0,
 //! so that lines of points a third further up differ by t y₀ and t y₁ at their ends.
 
+use super::super::STANDARD_GRAVITY;
 use super::super::fft::kernel::transpose;
 use super::super::fft::steps::{field, motion_stride};
 use super::super::fft::{LANES, Lane};
@@ -110,6 +111,13 @@ impl Patch {
         let [height, sideways, slope, stretch, curvature, bend] =
             most.map(|lane| lane.iter().fold(0.0, |a: f32, b| a.max(*b)) * 1.000_01);
         Bounds { height, sideways, slope, stretch, curvature, bend }
+    }
+
+    /// Variance (m²/s²) that is to be expected, at most, of how fast water rises: of waves with ω² = g k that of ω a, which by the inequality of Cauchy
+    /// and Schwarz is no more than g times the deviations of heights, a, and slopes, k a. Shallow water is slower.
+    pub fn variance_of_rising(&self) -> f64 {
+        let [xx, _, yy, height, _] = self.present[0];
+        STANDARD_GRAVITY * libm::sqrt(height.max(0.0) * (xx + yy).max(0.0))
     }
 
     /// Variance that is to be expected of heights, or of sideways displacements if that is more, of waves shorter than a length (m).

@@ -42,7 +42,7 @@ impl Changes {
         })
     }
 }
-impl RoamFlight<'_> {
+impl<G: Ground> RoamFlight<'_, G> {
     /// Draws the triangle of a diamond on the side of one of its parents, whose vertex is `apex`.
     pub(super) fn draw(&mut self, record: u32, diamond: Diamond, side: usize, apex: u32) {
         let known = self.records[record as usize];

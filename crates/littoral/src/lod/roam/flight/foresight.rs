@@ -7,7 +7,7 @@
 use super::super::bounds::prefetch;
 use super::*;
 
-impl RoamFlight<'_> {
+impl<G: Ground> RoamFlight<'_, G> {
     #[inline]
     fn expect_record(&self, record: u32) {
         if let Some(record) = self.records.get(record as usize) {

@@ -99,13 +99,15 @@ impl Queue {
     }
 }
 
-impl RoamFlight<'_> {
+impl<G: Ground> RoamFlight<'_, G> {
     /// From scratch: what is to be split is searched for without a record of anything, then split without a queue.
     pub(super) fn descend(&mut self) {
         let Some(lens) = &self.lens else { return };
         let budget = self.budget();
         let finest = self.finest();
-        let (bits, level, name) = self.search.run(self.bounds, lens, finest, self.tolerance, budget).last;
+        let found = self.bounds.search(&mut self.search, lens, finest, self.tolerance, budget);
+        // What cannot be searched for is found by splitting it.
+        let Some((bits, level, name)) = found else { return };
         self.border = f32::from_bits(bits);
         self.ready.clear();
         // Nothing is ready twice, and what becomes ready is pushed: the last first, while its memory is near.
@@ -129,9 +131,9 @@ impl RoamFlight<'_> {
     /// Makes the band wider and takes what it holds into the queues.
     fn widen(&mut self, low: f32, high: f32) {
         let (low, high) = (low.min(self.band.0), high.max(self.band.1));
-        let (list, shift) = (&self.list, self.bounds.shift());
+        let (list, bounds) = (&self.list, &self.bounds);
         let key = |&place: &u32| {
-            let at = list.middle(place).map(|c| c << shift);
+            let at = bounds.middle(list.item(place));
             Key::new(list.priority(place), Diamond::at(at), list.record(place))
         };
         if low < self.band.0 {

@@ -1,17 +1,17 @@
 //! Against Algorithm I, from scratch and without any queue.
 
 use super::*;
-use crate::field::{Land, Raster};
+use crate::field::{Land, Raster, Sea};
 use crate::lod::{Disc, RoamOnce};
+use crate::space::Datum;
+use crate::waves::{SeaState, Superposition};
 use glam::{DVec2, DVec3, UVec2};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
 /// Splits, one at a time, the triangle of greatest priority among all that are there; returns the triangles, and the greatest priority left.
-fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
-    let lens = flight.lens.as_ref().expect("a view was seen");
-    let number =
-        |diamond: Diamond| lens.priority(&flight.bounds.item(diamond, SPLIT, 0), flight.bounds.slopes(diamond));
+fn algorithm_one<G: Ground>(flight: &RoamFlight<'_, G>) -> (BTreeSet<[Point; 3]>, f32) {
+    let number = |diamond: Diamond| number(flight, diamond);
     let mut split: BTreeSet<u64> = BTreeSet::new();
     let mut leaves: Vec<(Diamond, usize)> = vec![(Diamond::ROOT, 0), (Diamond::ROOT, 1)];
     loop {
@@ -54,12 +54,16 @@ fn algorithm_one(flight: &RoamFlight) -> (BTreeSet<[Point; 3]>, f32) {
     (drawn.map(|(d, side)| turned(d.triangle(d.apexes()[side].expect("there")))).collect(), worst)
 }
 
+/// The priority of a diamond in the view seen last.
+fn number<G: Ground>(flight: &RoamFlight<'_, G>, diamond: Diamond) -> f32 {
+    let (lens, bounds) = (flight.lens.as_ref().expect("a view was seen"), &flight.bounds);
+    bounds.priority(lens, &bounds.item(bounds.bound(diamond), diamond, SPLIT, 0), bounds.slopes(diamond))
+}
+
 /// Whether no diamond has a greater priority than those that must be split before it.
-fn nested(flight: &RoamFlight) -> bool {
-    let lens = flight.lens.as_ref().expect("a view was seen");
-    let number =
-        |diamond: Diamond| lens.priority(&flight.bounds.item(diamond, SPLIT, 0), flight.bounds.slopes(diamond));
-    let finest = flight.bounds.finest();
+fn nested<G: Ground>(flight: &RoamFlight<'_, G>) -> bool {
+    let number = |diamond: Diamond| number(flight, diamond);
+    let finest = flight.limits.finest.min(flight.bounds.finest());
     let mut level = vec![Diamond::ROOT];
     while !level.is_empty() {
         let mut next = Vec::new();
@@ -85,7 +89,7 @@ fn turned(triangle: [Point; 3]) -> [Point; 3] {
     [triangle[first], triangle[(first + 1) % 3], triangle[(first + 2) % 3]]
 }
 
-fn drawn(flight: &RoamFlight) -> BTreeSet<[Point; 3]> {
+fn drawn<G: Ground>(flight: &RoamFlight<'_, G>) -> BTreeSet<[Point; 3]> {
     drawn_of(&flight.mesh)
 }
 
@@ -94,7 +98,7 @@ fn drawn_of(mesh: &Mesh) -> BTreeSet<[Point; 3]> {
     mesh.triangles.iter().map(|t| turned(t.map(|i| [corner(i).x, corner(i).y]))).collect()
 }
 
-fn split_set(flight: &RoamFlight) -> BTreeSet<Point> {
+fn split_set<G: Ground>(flight: &RoamFlight<'_, G>) -> BTreeSet<Point> {
     let splits = flight.list.word_records().filter(|&r| flight.records[r as usize].list != NOWHERE);
     let mut all = BTreeSet::new();
     let mut stack: Vec<u32> = splits.collect();
@@ -237,6 +241,44 @@ proptest! {
             if before.1.0 > 0 {
                 prop_assert!(done <= changed + 8, "{} steps for {} changes", done, changed);
             }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(cases()))]
+
+    /// Over a sea, too, whatever was seen before, and when.
+    #[test]
+    fn every_frame_over_a_sea_is_as_good_as_from_scratch(
+        size in (300f64..3000.0, 300f64..3000.0),
+        wind in 2f64..20.0,
+        finest in 1u8..6,
+        budget in prop_oneof![2usize..300, Just(100_000)],
+        tolerance in 0.3f32..40.0,
+        views in prop::collection::vec(((-0.5f64..1.5, -0.5f64..1.5, -20f64..120.0), (0f64..6.3, -1.5f64..0.5), -500f64..500.0), 1..6),
+        distance in any::<bool>(),
+        fog in prop_oneof![Just(f32::INFINITY), 30f32..900.0],
+    ) {
+        let (origin, size) = (DVec2::new(-4e5, 9e4), DVec2::new(size.0, size.1));
+        let waves = Superposition::of_state(&SeaState::of_wind(wind, 1.0, 2e5).expect("a wind"), 4, 3).expect("a sea");
+        let mut sea = Sea::new(Datum::Plane { origin, size }, 12.0).with(Box::new(waves));
+        let mut flight = RoamSea::new(Limits { finest, triangles: budget }).with_lateness(0.0);
+        if distance {
+            flight.priority = Priority::InverseDistance;
+        }
+        flight.factors.fog = fog;
+        for ((u, v, up), (yaw, pitch), time) in views {
+            let eye = (origin + size * DVec2::new(u, v)).extend(up);
+            let ahead = DVec3::new(yaw.cos() * pitch.cos(), yaw.sin() * pitch.cos(), pitch.sin());
+            let mut view = View::looking_at(eye, eye + ahead, 1.0, UVec2::new(320, 200));
+            view.tolerance_pixels = tolerance;
+            sea.set_time(time);
+            let reached = flight.update(&sea, &view, &mut || false).expect("a view");
+            prop_assert!(nested(&flight));
+            let (triangles, worst) = algorithm_one(&flight);
+            prop_assert_eq!(drawn(&flight), triangles);
+            prop_assert_eq!(reached.pixels, worst);
         }
     }
 }
