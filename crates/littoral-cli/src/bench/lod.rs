@@ -81,10 +81,10 @@ impl Going<'_> {
         }
     }
 
-    /// Heights that the last frame asked for, and how long that took (s).
-    fn heights(&self) -> (usize, f64) {
+    /// Heights that the last frame asked for.
+    fn heights(&self) -> usize {
         match self {
-            Going::Land(flight) => (flight.changed_vertices().map(|range| range.len()).sum(), 0.0),
+            Going::Land(flight) => flight.changed_vertices().map(|range| range.len()).sum(),
             Going::Sea(flight) => flight.heights_asked(),
         }
     }
@@ -239,25 +239,26 @@ impl Lod {
                 (None, Over::Sea(_)) => unreachable!("a sea was borrowed"),
             };
             let start = Instant::now();
+            let mut asked = start;
+            let mut stop = || {
+                asked = Instant::now();
+                false
+            };
             let reached = match (&mut roam, &sea) {
                 (Some(Going::Land(roam)), _) => roam.update(&view, &mut || false),
-                (Some(Going::Sea(roam)), Some(sea)) => roam.update(sea, &view, &mut || false),
+                (Some(Going::Sea(roam)), Some(sea)) => roam.update(sea, &view, &mut stop),
                 _ => lod.select(field, &view, &mut drawing),
             };
             let reached = reached.map_err(|e| Failure::Work(e.to_string()))?;
-            let chosen = Instant::now();
-            let heights = match &roam {
-                Some(roam) => roam.heights().1,
-                None => {
-                    drawing.expand(field);
-                    chosen.elapsed().as_secs_f64()
-                }
-            };
+            // Over a sea heights come after the last question whether to stop.
+            let chosen = if let Some(Going::Sea(_)) = roam { asked } else { Instant::now() };
+            if roam.is_none() {
+                drawing.expand(field);
+            }
             // The first frame comes from nothing.
             if frame > 0 || frames < 3 {
-                let within = if roam.is_some() { heights } else { 0.0 };
-                select.push(((chosen - start).as_secs_f64() - within) * 1e3);
-                expand.push(heights * 1e3);
+                select.push((chosen - start).as_secs_f64() * 1e3);
+                expand.push(if let Some(Going::Land(_)) = roam { 0.0 } else { chosen.elapsed().as_secs_f64() * 1e3 });
             }
             if let Some(roam) = &roam {
                 drawing.mesh.clone_from(roam.mesh());
@@ -269,7 +270,7 @@ impl Lod {
             let measured = frame % stride == 1 % stride && (frames >= MEASURED * 4 || errors.is_empty());
             if measured {
                 evaluated.push(match &roam {
-                    Some(roam) => roam.heights().0,
+                    Some(roam) => roam.heights(),
                     None => {
                         let counted = Counted::new(field);
                         lod.select(&counted, &view, &mut drawing).map_err(|e| Failure::Work(e.to_string()))?;

@@ -17,7 +17,8 @@ pub enum Method {
     Patches,
     /// Strips along rows: [`Strips`].
     Strips,
-    /// A bintree of right triangles: [`Roam`], which chooses anew for each view ([`RoamFlight`](super::RoamFlight) goes on from view to view).
+    /// A bintree of right triangles: [`Roam`], which chooses anew for each view ([`RoamFlight`](super::RoamFlight) goes on from view to view, over
+    /// a sea [`RoamSea`](super::RoamSea)).
     Roam,
 }
 

@@ -3,7 +3,7 @@
 //! The face is two triangles; each can be bisected at the middle of its base, together with the one on the base's other side. A
 //! triangle's neighbour that is too coarse for that is split first (a *forced split*), so that no vertex ever lies on an edge. What is split
 //! next is what is drawn farthest from its place (Algorithm I): with the total order of [`Roam`] the outcome depends on the question alone. Over prepared
-//! land, whose bounds are nested, [`RoamOnce`] finds the same without a queue, and [`RoamFlight`] changes it from view to view.
+//! land, whose bounds are nested, [`RoamOnce`] finds the same without a queue, and [`RoamFlight`] changes it from view to view, [`RoamSea`] over a sea that moves.
 //!
 //! *Bounds over any field.* A half of the cell P is at most `error(P)` off. A quarter of P, over one of its sides, becomes two halves of smaller cells C when
 //! that side's middle is raised into place: it is off by at most the greater `error(C)` and that middle's deviation; and by at most twice `error(P)`,

@@ -93,7 +93,7 @@ fn flights_over_a_moving_sea_keep_every_promise() {
                 lod.sea.set_time(time);
                 let label = format!("sea seed {seed} view {turn}, lateness {lateness}");
                 check(&mut lod, &Case { surface: &surface, view: &view, limits, label: &label }, &mut random);
-                late += lod.flight.mesh().vertices.len() - lod.flight.heights_asked().0;
+                late += lod.flight.mesh().vertices.len() - lod.flight.heights_asked();
                 // What was seen before leaves no trace in what is drawn; without lateness, none in heights.
                 let mut anew = make();
                 anew.sea.set_time(time);
@@ -153,7 +153,7 @@ fn far_heights_wait_and_the_work_is_spread() {
     for frame in 0..60 {
         sea.set_time(f64::from(frame) / 60.0);
         flight.update(&sea, &low_over_the_sea(0.0), &mut || false).expect("a view");
-        asked.push(flight.heights_asked().0);
+        asked.push(flight.heights_asked());
     }
     let all = flight.mesh().vertices.len();
     assert_eq!(asked[0], all, "at first nothing is known");
@@ -161,7 +161,7 @@ fn far_heights_wait_and_the_work_is_spread() {
     assert!(0 < least && most < all / 2, "{least} to {most} of {all} heights a frame");
     assert!(most < 2 * least, "{least} to {most} heights a frame");
     flight.update(&sea, &low_over_the_sea(0.0), &mut || false).expect("a view");
-    assert_eq!(flight.heights_asked().0, 0, "nothing moved");
+    assert_eq!(flight.heights_asked(), 0, "nothing moved");
 }
 
 #[test]

@@ -25,7 +25,6 @@ use crate::field::{HeightField, Sea};
 use crate::lod::drawing::place;
 use crate::space::{Cell, Datum};
 use multiversion::multiversion;
-use std::time::Instant;
 
 /// ROAM over a moving sea, from frame to frame: of all that [`RoamFlight`] tells, and with one more argument, the sea at its instant.
 pub type RoamSea = RoamFlight<'static, Waves>;
@@ -53,7 +52,6 @@ pub struct Waves {
     due: Vec<u32>,
     places: Vec<Place>,
     heights: Vec<f32>,
-    seconds: f64,
 }
 
 impl Waves {
@@ -214,7 +212,6 @@ impl RoamSea {
                 due: Vec::new(),
                 places: Vec::new(),
                 heights: Vec::new(),
-                seconds: 0.0,
             },
             limits,
         )
@@ -227,7 +224,8 @@ impl RoamSea {
         self
     }
 
-    /// Changes the mesh into that of `view` and of the sea's instant. `stop` is asked between steps of the choice of triangles, as over land; heights come after it.
+    /// Changes the mesh into that of `view` and of the sea's instant. `stop` is asked between steps of the choice of triangles, as over land, and once more when that is
+    /// done: heights come after it.
     ///
     /// Which triangles are drawn depends on the view and the instant alone, and so does all else with a lateness of 0. With more, the heights of far vertices depend on
     /// when they were asked for, and what they may be off by is part of what is reached. It is always the same sea that is shown, at any instants;
@@ -245,18 +243,18 @@ impl RoamSea {
         let share = if speed.is_finite() { self.bounds.share } else { 0.0 };
         let sharper = View { tolerance_pixels: view.tolerance_pixels * (1.0 - share), ..*view };
         let reached = self.advance(&sharper, stop)?;
+        stop();
         let late = self.raise(sea, speed, view.tolerance_pixels * share);
         Ok(Reached { pixels: reached.pixels + late, ..reached })
     }
 
-    /// How many heights the last update asked for, and how long it took to find out which and to ask (s).
-    pub fn heights_asked(&self) -> (usize, f64) {
-        (self.bounds.due.len(), self.bounds.seconds)
+    /// How many heights the last update asked for.
+    pub fn heights_asked(&self) -> usize {
+        self.bounds.due.len()
     }
 
     /// Asks for the heights that are new, or too late by more than `room` pixels; returns by how much the others may be.
     fn raise(&mut self, sea: &Sea, speed: f32, room: f32) -> f32 {
-        let started = Instant::now();
         let Some(lens) = &self.lens else { return 0.0 };
         let vertices = &mut self.mesh.vertices;
         let waves = &mut self.bounds;
@@ -289,7 +287,6 @@ impl RoamSea {
             waves.asked[vertex as usize] = now;
             Changes::mark(&mut self.changed.vertices, vertex);
         }
-        waves.seconds = started.elapsed().as_secs_f64();
         latest
     }
 }
