@@ -69,8 +69,8 @@ enum Over<'a> {
 
 /// ROAM that goes on from frame to frame, with the mesh in place.
 enum Going<'a> {
-    Land(RoamFlight<'a>),
-    Sea(RoamSea),
+    Land(Box<RoamFlight<'a>>),
+    Sea(Box<RoamSea>),
 }
 
 impl Going<'_> {
@@ -203,9 +203,9 @@ impl Lod {
         let mut lod = method.within(limits);
         let (mut roam, prepared) = match flight.over {
             Over::Land(_, bounds) if method == Method::Roam && goes_on => {
-                (Some(Going::Land(RoamFlight::over(bounds, limits))), bounds.bytes())
+                (Some(Going::Land(Box::new(RoamFlight::over(bounds, limits)))), bounds.bytes())
             }
-            Over::Sea(_) if method == Method::Roam && goes_on => (Some(Going::Sea(RoamSea::new(limits))), 0),
+            Over::Sea(_) if method == Method::Roam && goes_on => (Some(Going::Sea(Box::new(RoamSea::new(limits)))), 0),
             _ => (None, 0),
         };
         let mut drawing = Drawing::default();
