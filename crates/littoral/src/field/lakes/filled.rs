@@ -4,6 +4,9 @@
 //! D. Mulla, "Priority-flood: an optimal depression-filling and watershed-labeling algorithm", 2014), begun inside a hollow in place of the border. What is
 //! wetted before it first rises above the level is the lake. It is followed further until it runs out over the border or into the sea: how high it stands then is the lowest
 //! sill of the hollow, and where it last rose, the place of its outlet.
+//!
+//! Voids are walls. But many files are void all round, and there the data end: water that stands deep at such a void runs out, while one with a rim about at the level, of
+//! a bed that was sounded and nothing else, is the shore.
 
 use super::{Lakes, Land, Water};
 use glam::DVec2;
@@ -21,7 +24,7 @@ pub struct Filled {
     pub volume: f64,
     /// Its greatest depth (m).
     pub deepest: f64,
-    /// Where it would overflow if it rose; `None` where it never would, since voids are all about it.
+    /// Where it would overflow if it rose; `None` where it never would, since voids are all about it that do not go on to the raster's edge, or are its shore.
     pub outlet: Option<Outlet>,
     /// Voids beside it. It ends at them, but they may be an outlet.
     pub voids_beside: usize,
@@ -114,8 +117,8 @@ impl LakeError {
 }
 
 impl Lakes {
-    /// Fills the hollow at a place (m) of `land`, whose ground is its bed, with water up to a level (m). Samples join at their corners, too; voids are walls. A level
-    /// hollow that it drowns becomes part of it.
+    /// Fills the hollow at a place (m) of `land`, whose ground is its bed, with water up to a level (m). Samples join at their corners, too. It ends at voids; at those
+    /// that go on to the raster's edge only if it is shallow there. A level hollow that it drowns becomes part of it.
     ///
     /// # Errors
     /// If the place is void, outside, above the level or in the sea; if the water would run out of the data, into `sea`, or meet another lake that was filled; if there
@@ -137,17 +140,26 @@ impl Lakes {
         if let Some(outlet) = hollow.outlet.filter(|outlet| outlet.height <= level) {
             return Err(LakeError::Overflows { level, outlet });
         }
+        let depths = hollow.wet.iter().map(|&i| level - f64::from(land.raster().heights()[i]));
+        let deepest = depths.clone().fold(0.0, f64::max);
+        if let Some(outlet) = hollow.brink.filter(|outlet| outlet.height <= level) {
+            // About at the level: a shore on a slope of one in two, and no more than a twentieth of all depth.
+            let shallow = (0.5 * self.spacing.max_element()).max(0.05 * deepest);
+            let deep = |i: &&usize| level - f64::from(land.raster().heights()[**i]) > shallow;
+            if hollow.by_voids.iter().filter(deep).count() as f64 > DEEP * hollow.by_voids.len() as f64 {
+                return Err(LakeError::Overflows { level, outlet });
+            }
+        }
         if let Some(number) = hollow.wet.iter().find_map(|&i| self.samples[i].checked_sub(Lakes::FARTHEST + 1)) {
             return Err(LakeError::Meets { level: self.filled[usize::from(number)].level });
         }
-        let depths = hollow.wet.iter().map(|&i| level - f64::from(land.raster().heights()[i]));
         let cell = self.spacing.x * self.spacing.y;
         let filled = Filled {
             level,
             area: hollow.wet.len() as f64 * cell,
-            volume: depths.clone().sum::<f64>() * cell,
-            deepest: depths.fold(0.0, f64::max),
-            outlet: hollow.outlet,
+            volume: depths.sum::<f64>() * cell,
+            deepest,
+            outlet: hollow.brink.filter(|outlet| outlet.height > level).or(hollow.outlet),
             voids_beside: hollow.voids_beside,
         };
         self.filled.push(filled);
@@ -177,12 +189,13 @@ impl Lakes {
     fn pour(&self, land: &Land, sea: Option<&Water>, from: usize, level: f64) -> Poured {
         let raster = land.raster();
         let (columns, rows, heights, voids) = (self.columns, self.rows, raster.heights(), raster.voids());
+        let edge = land.voids_from_the_edge();
         let is_sea = |i: usize| sea.is_some_and(|sea| sea.floods(i));
         let mut seen = vec![false; columns * rows];
         // Samples no higher than the water stands, and those it has to rise to, the lowest first.
         let (mut low, mut rim) = (vec![from], BinaryHeap::new());
         let (mut stands, mut sill) = (heights[from], from);
-        let mut poured = Poured { wet: Vec::new(), voids_beside: 0, outlet: None };
+        let mut poured = Poured::default();
         seen[from] = true;
         loop {
             let i = match low.pop() {
@@ -197,18 +210,22 @@ impl Lakes {
             };
             let (column, row) = (i % columns, i / columns);
             let is_border = column == 0 || row == 0 || column + 1 == columns || row + 1 == rows;
-            if is_border || is_sea(i) {
+            let outlet = |into_sea: bool| {
                 let place = DVec2::new((sill % columns) as f64, (sill / columns) as f64);
-                let at = self.origin + place * self.spacing;
-                poured.outlet = Some(Outlet { height: f64::from(stands), at, into_sea: is_sea(i) });
+                Outlet { height: f64::from(stands), at: self.origin + place * self.spacing, into_sea }
+            };
+            if is_border || is_sea(i) {
+                poured.outlet = Some(outlet(is_sea(i)));
                 return poured;
             }
             let is_wet = f64::from(stands) <= level;
             if is_wet {
                 poured.wet.push(i);
             }
+            let mut is_by_void = false;
             for r in row - 1..row + 2 {
                 for j in r * columns + column - 1..r * columns + column + 2 {
+                    is_by_void |= edge.get(j) == Some(&true) && !is_sea(j);
                     if std::mem::replace(&mut seen[j], true) {
                         continue;
                     }
@@ -222,14 +239,28 @@ impl Lakes {
                     }
                 }
             }
+            if is_by_void {
+                poured.brink.get_or_insert(outlet(false));
+                if is_wet {
+                    poured.by_voids.push(i);
+                }
+            }
         }
     }
 }
 
+/// The part of a lake's samples by voids at which the data end that may be deep.
+const DEEP: f64 = 0.35;
+
 /// What water has wetted.
+#[derive(Default)]
 struct Poured {
     wet: Vec<usize>,
     voids_beside: usize,
+    /// Those of the wet that are by voids at which the data end, and where water first got there.
+    by_voids: Vec<usize>,
+    brink: Option<Outlet>,
+    /// Where it got to the border or into the sea.
     outlet: Option<Outlet>,
 }
 

@@ -67,7 +67,7 @@ fn what_would_run_out_says_how_high_and_where() {
 fn lakes_are_named_where_they_can_lie() {
     // Two bowls in a plain at 10 m, a sea in the west, a void in the north-east.
     let land = land(81, 41, 10.0, |x, y| match () {
-        _ if x > 70.0 && y > 30.0 => f64::NAN,
+        _ if x > 76.0 && y > 36.0 => f64::NAN,
         _ if x < 8.0 => -5.0,
         _ => [(30.0, 20.0), (60.0, 20.0)].iter().map(|(a, b)| 0.6 * (x - a).hypot(y - b)).fold(10.0, f64::min) - 6.0,
     });
@@ -76,7 +76,7 @@ fn lakes_are_named_where_they_can_lie() {
     let sea = Some(&sea);
     let mut lakes = Lakes::none(&land);
     let mut fill = |x, y, level| lakes.fill(&land, sea, world(x, y), level);
-    assert!(matches!(fill(75.0, 35.0, 1.0), Err(LakeError::NoGround { .. })));
+    assert!(matches!(fill(78.0, 38.0, 1.0), Err(LakeError::NoGround { .. })));
     assert!(matches!(fill(-5.0, 3.0, 1.0), Err(LakeError::NoGround { .. })));
     assert!(matches!(fill(f64::NAN, 3.0, 1.0), Err(LakeError::NoGround { .. })));
     assert_eq!(fill(45.0, 20.0, 2.5), Err(LakeError::Dry { level: 2.5, ground: 3.0 }));
@@ -124,6 +124,34 @@ fn the_sea_is_an_outlet_and_a_drowned_hollow_is_no_lake_of_its_own() {
 }
 
 #[test]
+fn where_the_data_end_in_voids_a_shore_holds_and_a_valley_runs_out() {
+    // A bed that was sounded as far as its shore, and nothing else.
+    let sounded = land(101, 101, 5.0, |x, y| {
+        let away = (x - 50.0).hypot(y - 50.0) / 40.0;
+        if away > 1.0 { f64::NAN } else { 100.0 - 30.0 * (1.0 - away * away) }
+    });
+    let mut lakes = Lakes::none(&sounded);
+    let filled = lakes.fill(&sounded, None, DVec2::ZERO, 100.2).expect("as far as its shore");
+    assert!(filled.voids_beside > 200 && filled.outlet.is_none(), "{filled:?}");
+    assert!((filled.deepest - 30.2).abs() < 1e-4);
+    // Water that stands deep where the data end runs out there, at the height of the lowest ground beside them.
+    assert!(matches!(
+        Lakes::none(&sounded).fill(&sounded, None, DVec2::ZERO, 130.0),
+        Err(LakeError::Overflows { outlet: Outlet { into_sea: false, .. }, .. })
+    ));
+    let valley = land(61, 61, 5.0, |x, y| match () {
+        _ if !(6.0..=54.0).contains(&x) || !(6.0..=54.0).contains(&y) => f64::NAN,
+        _ => 50.0 + 2.0 * (x - 30.0).abs() + 0.1 * (y - 30.0).abs(),
+    });
+    let Err(LakeError::Overflows { outlet, .. }) = Lakes::none(&valley).fill(&valley, None, DVec2::ZERO, 60.0) else {
+        panic!("held by nothing")
+    };
+    assert!((outlet.height - 52.4).abs() < 1e-4, "{outlet:?}");
+    let held = Lakes::none(&valley).fill(&valley, None, DVec2::ZERO, 52.0).expect("below that");
+    assert_eq!((held.outlet, held.voids_beside), (Some(outlet), 0));
+}
+
+#[test]
 fn there_is_an_end_to_them() {
     let dimples = land(140, 5, 1.0, |x, y| if y == 2.0 && x as i64 % 4 == 2 { 0.0 } else { 1.0 });
     let mut lakes = Lakes::none(&dimples);
@@ -166,8 +194,8 @@ fn it_fills_what_a_flood_sample_by_sample_does() {
         state ^= state << 17;
         (state >> 40) as f32 / (1u64 << 24) as f32
     };
-    let (mut held, mut ran, mut beside, mut endless) = (0, 0, 0, 0);
-    for round in 0..1500 {
+    let (mut held, mut ran, mut beside, mut endless, mut shore, mut away) = (0, 0, 0, 0, 0, 0);
+    for round in 0..2500 {
         let (columns, rows) = (3 + (next() * 14.0) as usize, 3 + (next() * 14.0) as usize);
         let (voids, fine) = (if next() < 0.5 { 0.0 } else { 0.5 * next() }, 1.0 + (6.0 * next()).floor());
         let heights: Vec<f32> = (0..columns * rows)
@@ -201,36 +229,57 @@ fn it_fills_what_a_flood_sample_by_sample_does() {
             .expect("four");
         let wet = flood(&land, from, level);
         // The lowest level, of those of samples, from which a flood gets to the border.
+        let is_void = |i: usize| land.raster().voids().is_void(i);
+        let around = |i: usize| {
+            let (c, r) = (i % columns, i / columns);
+            (r.saturating_sub(1)..(r + 2).min(rows))
+                .flat_map(move |r| (c.saturating_sub(1)..(c + 2).min(columns)).map(move |c| r * columns + c))
+        };
+        // Voids in one piece with the edge.
+        let mut edge: Vec<bool> = (0..wet.len()).map(|i| is_void(i) && border(&i)).collect();
+        while let Some(i) = (0..wet.len()).find(|&i| is_void(i) && !edge[i] && around(i).any(|j| edge[j])) {
+            edge[i] = true;
+        }
+        let by_void = |i: usize| around(i).any(|j| edge[j]);
         let runs = |level: &f64| (0..columns * rows).filter(border).any(|i| flood(&land, from, *level)[i]);
-        let valid = (0..columns * rows).filter(|&i| !land.raster().voids().is_void(i));
+        let gets_to_void = |level: &f64| {
+            let wet = flood(&land, from, *level);
+            (0..wet.len()).any(|i| wet[i] && by_void(i))
+        };
+        let valid = (0..columns * rows).filter(|&i| !is_void(i));
         let mut levels: Vec<f64> = valid.map(|i| f64::from(land.raster().heights()[i])).collect();
         levels.sort_by(f64::total_cmp);
-        let sill = levels.iter().copied().find(runs);
+        let (sill, brink) = (levels.iter().copied().find(runs), levels.iter().copied().find(gets_to_void));
+        let over = |sill: Option<f64>| sill.is_some_and(|sill| sill <= level);
+        let depth = |i: usize| level - f64::from(land.raster().heights()[i]);
+        let deepest = (0..wet.len()).filter(|&i| wet[i]).map(depth).fold(0.0, f64::max);
+        let by_voids: Vec<usize> = (0..wet.len()).filter(|&i| wet[i] && by_void(i)).collect();
+        let deep = by_voids.iter().filter(|&&i| depth(i) > 1.5f64.max(0.05 * deepest)).count();
+        let is_deep = deep as f64 > 0.35 * by_voids.len() as f64;
         match answer {
             Ok(filled) => {
                 held += 1;
-                endless += usize::from(sill.is_none());
+                endless += usize::from(filled.outlet.is_none());
+                shore += usize::from(over(brink));
+                assert!(!over(sill) && !(over(brink) && is_deep));
                 assert!((0..wet.len()).all(|i| wet[i] == (lakes.samples()[i] > 0)));
-                assert_eq!(filled.outlet.map(|outlet| outlet.height), sill);
-                assert!(sill.is_none_or(|sill| sill > level));
-                let near = |i: &usize| {
-                    let (c, r) = (i % columns, i / columns);
-                    let mut around = (r.saturating_sub(1)..(r + 2).min(rows))
-                        .flat_map(|r| (c.saturating_sub(1)..(c + 2).min(columns)).map(move |c| r * columns + c));
-                    land.raster().voids().is_void(*i) && around.any(|i| wet[i])
-                };
+                let first = [sill, brink].into_iter().flatten().filter(|sill| *sill > level).min_by(f64::total_cmp);
+                assert_eq!(filled.outlet.map(|outlet| outlet.height), first);
+                let near = |i: &usize| is_void(*i) && around(*i).any(|i| wet[i]);
                 assert_eq!(filled.voids_beside, (0..wet.len()).filter(near).count());
                 beside += usize::from(filled.voids_beside > 0);
             }
             Err(LakeError::Overflows { outlet, .. }) => {
                 ran += 1;
-                assert_eq!(Some(outlet.height), sill);
-                assert!(outlet.height <= level && (0..wet.len()).filter(border).any(|i| wet[i]));
+                assert!(over(sill) || over(brink) && is_deep);
+                assert_eq!(Some(outlet.height), if over(sill) { sill } else { brink });
+                away += usize::from(!over(sill));
                 let at = (outlet.at - land.origin()) / land.raster().spacing();
                 assert_eq!(f64::from(land.raster().heights()[at.y as usize * columns + at.x as usize]), outlet.height);
             }
             Err(error) => panic!("{error}"),
         }
     }
-    assert!(held > 100 && ran > 100 && beside > 30 && endless > 10, "{held} {ran} {beside} {endless}");
+    let counts = [held, ran, beside, endless, shore, away];
+    assert!(counts.iter().all(|&count| count >= 5) && held > 100 && ran > 100, "{counts:?}");
 }
