@@ -267,11 +267,11 @@ fn lakes_over_known_beds_look_as_rays_see_them() {
     let high = View::looking_at(DVec3::new(700.0, -2500.0, 900.0), middle.extend(-270.0), 0.7, size);
     let low = View::looking_at(DVec3::new(0.0, -1150.0, -250.0), DVec3::new(150.0, 300.0, -290.0), 0.8, size);
     let down = View::looking_at(middle.extend(900.0), middle.extend(-270.0) + DVec3::Y, 0.9, size);
-    // From low down ripples are large, and differ from ray to ray.
+    // Rough slopes and, from low down, ripples differ from ray to ray.
     for (name, view, style, far) in [
-        ("reservoir", high, Style::Natural, 0.03),
+        ("reservoir", high, Style::Natural, 0.04),
         ("on the reservoir", low, Style::Natural, 0.04),
-        ("reservoir from above", down, Style::Natural, 0.03),
+        ("reservoir from above", down, Style::Natural, 0.04),
         ("map of the reservoir", down, Style::Tint, 0.03),
     ] {
         let scene = Scene { style, border: Border::Mist, sun: Sun::new(4.2, 0.6), ..scene };
