@@ -31,7 +31,9 @@ pub enum GpuError {
         tried: String,
     },
     /// The adapter lacks what is needed.
-    #[error("expected {wanted}, but {adapter} offers {offered}; choose another adapter, or draw on the processor")]
+    #[error(
+        "expected {wanted}, but {adapter} offers {offered}; choose another adapter (WGPU_ADAPTER_NAME), or draw on the processor"
+    )]
     TooLittle {
         /// The adapter's name.
         adapter: String,
@@ -58,6 +60,13 @@ pub enum GpuError {
     },
 }
 
+/// What is done with textures that not every adapter can do.
+const FORMATS: [(wgpu::TextureFormat, wgpu::TextureUsages, &str); 3] = [
+    (crate::renderer::RADIANCE, wgpu::TextureUsages::RENDER_ATTACHMENT, "drawing into"),
+    (wgpu::TextureFormat::Rgba32Float, wgpu::TextureUsages::STORAGE_BINDING, "writing to"),
+    (wgpu::TextureFormat::R32Float, wgpu::TextureUsages::STORAGE_BINDING, "writing to"),
+];
+
 impl Gpu {
     /// The best adapter there is, without a window. The usual variables of wgpu choose another: `WGPU_BACKEND`, `WGPU_ADAPTER_NAME`.
     pub fn headless() -> Result<Gpu, GpuError> {
@@ -76,10 +85,21 @@ impl Gpu {
         wanted.check_limits_with_fail_fn(&limits, false, |name, wanted, offered| {
             let _ = write!(lacks, "{}{name} {offered} of {wanted}", if lacks.is_empty() { "" } else { ", " });
         });
+        // Some drivers of OpenGL keep the limits, but cannot draw into every kind of texture. The adapter of tests tells of none.
+        for (format, usage, verb) in FORMATS {
+            if info.backend != wgpu::Backend::Noop
+                && !adapter.get_texture_format_features(format).allowed_usages.contains(usage)
+            {
+                let _ = write!(lacks, "{}no {verb} {format:?} textures", if lacks.is_empty() { "" } else { ", " });
+            }
+        }
         if !lacks.is_empty() {
+            if info.backend == wgpu::Backend::Gl {
+                lacks.push_str(" (a driver for Vulkan, Metal or Direct3D 12 may do better)");
+            }
             return Err(GpuError::TooLittle {
-                adapter: info.name,
-                wanted: "the limits that WebGPU promises".into(),
+                adapter: format!("{} ({})", info.name, info.backend),
+                wanted: "what WebGPU promises".into(),
                 offered: lacks,
             });
         }

@@ -245,10 +245,13 @@ impl<'a> RayCaster<'a> {
     }
 
     fn walk<const ANY: bool, T: Copy>(&self, rays: &[LocalRay], out: &mut [T], answer: fn(f32) -> T) {
-        if rays.iter().any(|ray| ray.spread > 0.0) {
-            self.walk_as::<true, ANY, T>(rays, out, answer);
-        } else {
-            self.walk_as::<false, ANY, T>(rays, out, answer);
+        // A part at a time, so that rays are still near when they are walked.
+        for (rays, out) in rays.chunks(PART).zip(out.chunks_mut(PART)) {
+            if rays.iter().any(|ray| ray.spread > 0.0) {
+                self.walk_as::<true, ANY, T>(rays, out, answer);
+            } else {
+                self.walk_as::<false, ANY, T>(rays, out, answer);
+            }
         }
     }
 
@@ -314,36 +317,19 @@ impl<T: Copy, const FOOTPRINT: bool> Rays for Stream<'_, T, FOOTPRINT> {
         let left = self.order.map_or(self.rays.len(), <[i32]>::len) - self.next;
         block.count = left.min(BLOCK);
         for at in (0..block.count).step_by(L::COUNT) {
-            let (mut id, mut numbers) = ([0; 16], [[0.0; 16]; 7]);
+            let mut id = [0; 16];
+            let mut rows = [&[0.0; 8]; 16];
             for lane in 0..L::COUNT {
                 // The last vector repeats the last ray.
                 let index = self.next + (at + lane).min(block.count - 1);
-                let index = self.order.map_or(index as i32, |order| order[index]);
-                let ray = &self.rays[index as usize];
-                id[lane] = index;
-                let from = [
-                    ray.origin.x,
-                    ray.origin.y,
-                    ray.origin.z,
-                    ray.direction.x,
-                    ray.direction.y,
-                    ray.direction.z,
-                    ray.reach,
-                ];
-                for (number, from) in numbers.iter_mut().zip(from) {
-                    number[lane] = from;
-                }
+                id[lane] = self.order.map_or(index as i32, |order| order[index]);
+                rows[lane] = bytemuck::cast_ref(&self.rays[id[lane] as usize]);
             }
-            let origin = [l.load(&numbers[0]), l.load(&numbers[1]), l.load(&numbers[2])];
-            let direction = [l.load(&numbers[3]), l.load(&numbers[4]), l.load(&numbers[5])];
-            let reach = l.load(&numbers[6]);
+            let [x, y, z, reach, dx, dy, dz, spread] = l.columns(rows);
             let (zero, top) = (l.splat(0.0), l.int(scene.top.min(START)));
-            block.set(l, scene, at, l.load_int(&id), origin, direction, reach, zero, top);
+            block.set(l, scene, at, l.load_int(&id), [x, y, z], [dx, dy, dz], reach, zero, top);
             if FOOTPRINT {
-                let per_metre = scene.per_metre.min_element();
-                for (spread, &id) in block.spread[at..at + L::COUNT].iter_mut().zip(&id) {
-                    *spread = self.rays[id as usize].spread * per_metre;
-                }
+                l.store(l.mul(spread, l.splat(scene.per_metre.min_element())), &mut block.spread[at..]);
             }
         }
         self.next += block.count;

@@ -22,7 +22,7 @@ const TILE: u32 = 64;
 const COARSE: u32 = 16;
 const FINE: u32 = tile::SIDE as u32;
 /// Width of a fine beam (cells) up to which its rays see few enough patches to walk together.
-const TOGETHER: f32 = 2.5;
+const TOGETHER: f32 = 2.0;
 const FINE_IN_TILE: usize = ((TILE / FINE) * (TILE / FINE)) as usize;
 
 /// The id of a ray beyond the picture's edge: no index of a slice.
@@ -304,7 +304,7 @@ impl<'a, const FOOTPRINT: bool> ViewRays<'a, FOOTPRINT> {
             let far = l.div(l.splat(self.diagonal(scene)), l.select(moves, slow, l.splat(1.0)));
             let end = l.select(rises, l.max(out, zero), l.splat(f32::INFINITY));
             let end = l.min(l.select(moves, far, l.splat(f32::INFINITY)), end);
-            let one = l.int(1);
+            let (one, all) = (l.int(1), l.mask(u32::MAX));
             let mut active = l.lt(t, end);
             let (mut steps, most) = (0, 200);
             while l.bits(active) != 0 && steps < most {
@@ -323,10 +323,14 @@ impl<'a, const FOOTPRINT: bool> ViewRays<'a, FOOTPRINT> {
                 let (south, north) = (l.iadd(offset, l.imul(y0, stride)), l.iadd(offset, l.imul(y1, stride)));
                 // SAFETY: nodes are clamped to the raster's, at levels 1 to the top.
                 let (south_high, north_high) = unsafe {
-                    let west =
-                        (l.gather_u16(scene.highs, l.iadd(south, x0)), l.gather_u16(scene.highs, l.iadd(north, x0)));
-                    let east =
-                        (l.gather_u16(scene.highs, l.iadd(south, x1)), l.gather_u16(scene.highs, l.iadd(north, x1)));
+                    let west = (
+                        l.gather_u16(all, scene.highs, l.iadd(south, x0)),
+                        l.gather_u16(all, scene.highs, l.iadd(north, x0)),
+                    );
+                    let east = (
+                        l.gather_u16(all, scene.highs, l.iadd(south, x1)),
+                        l.gather_u16(all, scene.highs, l.iadd(north, x1)),
+                    );
                     (l.imax(west.0, east.0), l.imax(west.1, east.1))
                 };
                 let high = l.imax(south_high, north_high);

@@ -106,13 +106,17 @@ fn kernel<L: Lanes, P: Copy>(l: L, land: &Land, places: &[P], heights: &mut [f32
             v[lane] = (y - row) as f32;
         }
         let mut answers = [0.0f32; BLOCK];
+        let all = l.mask(u32::MAX);
         for at in (0..places.len()).step_by(L::COUNT) {
             let here = l.load_int(&index[at..]);
             let (u, v) = (l.load(&u[at..]), l.load(&v[at..]));
             // SAFETY: `index` names a sample with neighbours east, north and north-east; entries behind the last place
             // are those of an earlier block, or 0.
             let ((a, b), (c, d)) = unsafe {
-                (l.gather_pair(raster.heights(), here), l.gather_pair(raster.heights(), l.iadd(here, l.int(columns))))
+                (
+                    l.gather_pair(all, raster.heights(), here),
+                    l.gather_pair(all, raster.heights(), l.iadd(here, l.int(columns))),
+                )
             };
             l.store(blend(l, [a, b, c, d], u, v), &mut answers[at..]);
         }

@@ -71,16 +71,19 @@ pub(super) trait Lanes: Copy {
     fn expand(self, old: Self::F, mask: Self::M, from: &[f32]) -> Self::F;
     fn expand_int(self, old: Self::I, mask: Self::M, from: &[i32]) -> Self::I;
 
-    /// `from[index]`.
+    /// The first numbers of the first `COUNT` rows, their second ones, and so on.
+    fn columns(self, rows: [&[f32; 8]; 16]) -> [Self::F; 8];
+
+    /// `from[index]` where the mask is set, elsewhere 0.
     ///
     /// # Safety
-    /// `index` and `index + 1` lie within `from`.
-    unsafe fn gather_u16(self, from: &[u16], index: Self::I) -> Self::I;
-    /// `from[index]` and `from[index + 1]`.
+    /// Where the mask is set `index` and `index + 1` lie within `from`.
+    unsafe fn gather_u16(self, mask: Self::M, from: &[u16], index: Self::I) -> Self::I;
+    /// `from[index]` and `from[index + 1]` where the mask is set, elsewhere 0.
     ///
     /// # Safety
-    /// `index` and `index + 1` lie within `from`.
-    unsafe fn gather_pair(self, from: &[f32], index: Self::I) -> (Self::F, Self::F);
+    /// Where the mask is set `index` and `index + 1` lie within `from`, which holds two numbers at least.
+    unsafe fn gather_pair(self, mask: Self::M, from: &[f32], index: Self::I) -> (Self::F, Self::F);
 }
 
 /// Eight lanes in plain Rust, for any processor.
@@ -162,13 +165,17 @@ impl Lanes for Portable {
     #[inline(always)] fn lookup(self, table: &[i32; 16], index: Self::I) -> Self::I { each(index, |i| table[i as usize & 15]) }
     #[inline(always)] fn expand(self, old: Self::F, mask: Self::M, from: &[f32]) -> Self::F { expanded(old, mask, from) }
     #[inline(always)] fn expand_int(self, old: Self::I, mask: Self::M, from: &[i32]) -> Self::I { expanded(old, mask, from) }
-    #[inline(always)] unsafe fn gather_u16(self, from: &[u16], index: Self::I) -> Self::I {
-        // SAFETY: promised by the caller.
-        each(index, |i| unsafe { i32::from(*from.get_unchecked(i as usize)) })
+    #[inline(always)] fn columns(self, rows: [&[f32; 8]; 16]) -> [Self::F; 8] {
+        std::array::from_fn(|column| std::array::from_fn(|row| rows[row][column]))
     }
-    #[inline(always)] unsafe fn gather_pair(self, from: &[f32], index: Self::I) -> (Self::F, Self::F) {
+    #[inline(always)] unsafe fn gather_u16(self, mask: Self::M, from: &[u16], index: Self::I) -> Self::I {
         // SAFETY: promised by the caller.
-        unsafe { (each(index, |i| *from.get_unchecked(i as usize)), each(index, |i| *from.get_unchecked(i as usize + 1))) }
+        std::array::from_fn(|i| if mask[i] { unsafe { i32::from(*from.get_unchecked(index[i] as usize)) } } else { 0 })
+    }
+    #[inline(always)] unsafe fn gather_pair(self, mask: Self::M, from: &[f32], index: Self::I) -> (Self::F, Self::F) {
+        // SAFETY: promised by the caller.
+        let pick = |by: usize| std::array::from_fn(|i| if mask[i] { unsafe { *from.get_unchecked(index[i] as usize + by) } } else { 0.0 });
+        (pick(0), pick(1))
     }
 }
 
@@ -298,19 +305,52 @@ mod x86 {
             let dealt = unsafe { _mm256_permutevar8x32_epi32(self.load_int(from), self.expansion(mask)) };
             self.iselect(mask, dealt, old)
         }
-        #[inline(always)] unsafe fn gather_u16(self, from: &[u16], index: Self::I) -> Self::I {
-            // SAFETY: the caller promises that each index and the one after it lie within.
-            unsafe { _mm256_and_si256(_mm256_i32gather_epi32::<2>(from.as_ptr().cast(), index), _mm256_set1_epi32(0xFFFF)) }
+        #[inline(always)] fn columns(self, rows: [&[f32; 8]; 16]) -> [Self::F; 8] {
+            unsafe {
+                let mut row = [_mm256_setzero_ps(); 8];
+                for (row, from) in row.iter_mut().zip(rows) {
+                    *row = _mm256_loadu_ps(from.as_ptr());
+                }
+                let (mut low, mut high) = ([_mm256_setzero_ps(); 4], [_mm256_setzero_ps(); 4]);
+                for i in 0..4 {
+                    (low[i], high[i]) = (_mm256_unpacklo_ps(row[2 * i], row[2 * i + 1]), _mm256_unpackhi_ps(row[2 * i], row[2 * i + 1]));
+                }
+                // Columns k and k + 4 of four rows, and of the four next.
+                let mut quad = [[_mm256_setzero_ps(); 4]; 2];
+                for half in 0..2 {
+                    let ((a, b), (c, d)) = ((low[2 * half], low[2 * half + 1]), (high[2 * half], high[2 * half + 1]));
+                    quad[half] = [
+                        _mm256_shuffle_ps::<0x44>(a, b), _mm256_shuffle_ps::<0xEE>(a, b),
+                        _mm256_shuffle_ps::<0x44>(c, d), _mm256_shuffle_ps::<0xEE>(c, d),
+                    ];
+                }
+                let mut columns = [_mm256_setzero_ps(); 8];
+                for k in 0..4 {
+                    let (a, b) = (quad[0][k], quad[1][k]);
+                    (columns[k], columns[k + 4]) = (_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b));
+                }
+                columns
+            }
         }
-        #[inline(always)] unsafe fn gather_pair(self, from: &[f32], index: Self::I) -> (Self::F, Self::F) {
-            // SAFETY: the caller promises that each index and the one after it lie within.
+        #[inline(always)] unsafe fn gather_u16(self, mask: Self::M, from: &[u16], index: Self::I) -> Self::I {
+            // SAFETY: the caller promises that each index that is looked at and the one after it lie within.
+            unsafe {
+                let low = _mm256_set1_epi32(0xFFFF);
+                let here = _mm256_mask_i32gather_epi32::<2>(_mm256_setzero_si256(), from.as_ptr().cast(), index, _mm256_castps_si256(mask));
+                _mm256_and_si256(here, low)
+            }
+        }
+        #[inline(always)] unsafe fn gather_pair(self, mask: Self::M, from: &[f32], index: Self::I) -> (Self::F, Self::F) {
+            // SAFETY: the caller promises that each index that is looked at and the one after it lie within; so does the first.
             unsafe {
                 let at = from.as_ptr().cast::<f64>();
+                let index = _mm256_and_si256(index, _mm256_castps_si256(mask));
                 let low = _mm256_castpd_ps(_mm256_i32gather_pd::<4>(at, _mm256_castsi256_si128(index)));
                 let high = _mm256_castpd_ps(_mm256_i32gather_pd::<4>(at, _mm256_extracti128_si256::<1>(index)));
                 // Lanes come out as 0 1 4 5 | 2 3 6 7.
                 let order = |v: __m256| _mm256_castpd_ps(_mm256_permute4x64_pd::<0b11_01_10_00>(_mm256_castps_pd(v)));
-                (order(_mm256_shuffle_ps::<0b10_00_10_00>(low, high)), order(_mm256_shuffle_ps::<0b11_01_11_01>(low, high)))
+                let (a, b) = (_mm256_shuffle_ps::<0b10_00_10_00>(low, high), _mm256_shuffle_ps::<0b11_01_11_01>(low, high));
+                (_mm256_and_ps(order(a), mask), _mm256_and_ps(order(b), mask))
             }
         }
     }
@@ -376,16 +416,50 @@ mod x86 {
         #[inline(always)] fn lookup(self, table: &[i32; 16], index: Self::I) -> Self::I { unsafe { _mm512_permutexvar_epi32(index, _mm512_loadu_si512(table.as_ptr().cast())) } }
         #[inline(always)] fn expand(self, old: Self::F, mask: Self::M, from: &[f32]) -> Self::F { unsafe { _mm512_mask_expand_ps(old, mask, self.load(from)) } }
         #[inline(always)] fn expand_int(self, old: Self::I, mask: Self::M, from: &[i32]) -> Self::I { unsafe { _mm512_mask_expand_epi32(old, mask, self.load_int(from)) } }
-        #[inline(always)] unsafe fn gather_u16(self, from: &[u16], index: Self::I) -> Self::I {
-            // SAFETY: the caller promises that each index and the one after it lie within.
-            unsafe { _mm512_and_si512(_mm512_i32gather_epi32::<2>(index, from.as_ptr().cast()), _mm512_set1_epi32(0xFFFF)) }
-        }
-        #[inline(always)] unsafe fn gather_pair(self, from: &[f32], index: Self::I) -> (Self::F, Self::F) {
-            // SAFETY: the caller promises that each index and the one after it lie within.
+        #[inline(always)] fn columns(self, rows: [&[f32; 8]; 16]) -> [Self::F; 8] {
             unsafe {
-                let at = from.as_ptr().cast::<f64>();
-                let low = _mm512_castpd_ps(_mm512_i32gather_pd::<4>(_mm512_castsi512_si256(index), at));
-                let high = _mm512_castpd_ps(_mm512_i32gather_pd::<4>(_mm512_extracti64x4_epi64::<1>(index), at));
+                // Quarters of the last step come out as 0 2 | 0 2: so rows 4 apart share a vector.
+                let mut row = [_mm512_setzero_ps(); 8];
+                for (i, row) in row.iter_mut().enumerate() {
+                    let first = i + (i & 4);
+                    let (a, b) = (_mm256_loadu_ps(rows[first].as_ptr()), _mm256_loadu_ps(rows[first + 4].as_ptr()));
+                    *row = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(a), b);
+                }
+                let (mut low, mut high) = ([_mm512_setzero_ps(); 4], [_mm512_setzero_ps(); 4]);
+                for i in 0..4 {
+                    (low[i], high[i]) = (_mm512_unpacklo_ps(row[2 * i], row[2 * i + 1]), _mm512_unpackhi_ps(row[2 * i], row[2 * i + 1]));
+                }
+                // Columns k and k + 4 of four rows, and of the four next.
+                let mut quad = [[_mm512_setzero_ps(); 4]; 2];
+                for half in 0..2 {
+                    let ((a, b), (c, d)) = ((low[2 * half], low[2 * half + 1]), (high[2 * half], high[2 * half + 1]));
+                    quad[half] = [
+                        _mm512_shuffle_ps::<0x44>(a, b), _mm512_shuffle_ps::<0xEE>(a, b),
+                        _mm512_shuffle_ps::<0x44>(c, d), _mm512_shuffle_ps::<0xEE>(c, d),
+                    ];
+                }
+                let mut columns = [_mm512_setzero_ps(); 8];
+                for k in 0..4 {
+                    let (a, b) = (quad[0][k], quad[1][k]);
+                    (columns[k], columns[k + 4]) = (_mm512_shuffle_f32x4::<0x88>(a, b), _mm512_shuffle_f32x4::<0xDD>(a, b));
+                }
+                columns
+            }
+        }
+        #[inline(always)] unsafe fn gather_u16(self, mask: Self::M, from: &[u16], index: Self::I) -> Self::I {
+            // SAFETY: the caller promises that each index that is looked at and the one after it lie within.
+            unsafe {
+                let here = _mm512_mask_i32gather_epi32::<2>(_mm512_setzero_si512(), mask, index, from.as_ptr().cast());
+                _mm512_and_si512(here, _mm512_set1_epi32(0xFFFF))
+            }
+        }
+        #[inline(always)] unsafe fn gather_pair(self, mask: Self::M, from: &[f32], index: Self::I) -> (Self::F, Self::F) {
+            // SAFETY: the caller promises that each index that is looked at and the one after it lie within.
+            unsafe {
+                let (at, zero) = (from.as_ptr().cast::<f64>(), _mm512_setzero_pd());
+                let low = _mm512_mask_i32gather_pd::<4>(zero, mask as u8, _mm512_castsi512_si256(index), at);
+                let high = _mm512_mask_i32gather_pd::<4>(zero, (mask >> 8) as u8, _mm512_extracti64x4_epi64::<1>(index), at);
+                let (low, high) = (_mm512_castpd_ps(low), _mm512_castpd_ps(high));
                 let even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
                 let odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
                 (_mm512_permutex2var_ps(low, even, high), _mm512_permutex2var_ps(low, odd, high))

@@ -18,6 +18,7 @@ pub(super) struct Scene<'a> {
     /// Coarsest level that rays use.
     pub top: i32,
     pub step: f32,
+    pub per_step: f32,
     /// Height of step 0, a hair further out than the pyramid's own, for what kernels round away.
     pub low_base: f32,
     pub high_base: f32,
@@ -62,6 +63,7 @@ impl<'a> Scene<'a> {
             strides,
             top: ranges.top().min(15) as i32,
             step: ranges.step,
+            per_step: 1.0 / ranges.step,
             low_base: ranges.base - hair,
             high_base: ranges.base + hair,
             cells: [raster.columns() as i32 - 1, raster.rows() as i32 - 1],

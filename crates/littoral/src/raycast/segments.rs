@@ -304,7 +304,7 @@ impl Cut {
             let row = l.floor(l.min(l.max(y, zero), l.splat(self.last[1][i])));
             let window = l.iadd(l.iadd(l.imul(row, l.int(self.columns[i])), column), l.int(self.offset[i]));
             // SAFETY: clamped to the windows of the level; the array ends with one number of padding.
-            let high = unsafe { l.gather_u16(tops.highs, window) };
+            let high = unsafe { l.gather_u16(l.mask(u32::MAX), tops.highs, window) };
             clear |= l.bits(l.lt(l.float(high), z)) << at;
         }
         !clear & 0xFFFF
@@ -506,7 +506,7 @@ impl Group {
             let line = l.imul(l.shr(inner_row, l.int(level)), l.int(stride));
             let node = l.iadd(l.iadd(line, l.shr(inner_column, l.int(level))), l.int(offset));
             // SAFETY: the cell was clamped to the raster's.
-            let low = l.float(unsafe { l.gather_u16(scene.lows, node) });
+            let low = l.float(unsafe { l.gather_u16(inside, scene.lows, node) });
             let low = l.add(l.mul(low, l.splat(scene.step)), l.splat(scene.low_base));
             any |= l.bits(l.and(inside, l.lt(z, low)));
         }
@@ -526,8 +526,12 @@ fn is_above<L: Lanes>(l: L, scene: &Scene, x: L::F, y: L::F, z: L::F) -> L::M {
     let inside = l.and(l.ieq(i, inner_i), l.ieq(j, inner_j));
     let at = l.iadd(l.imul(inner_j, l.int(scene.columns)), inner_i);
     // SAFETY: the patch was clamped to the raster's; it has samples east, north and north-east.
-    let ((a, b), (c, d)) =
-        unsafe { (l.gather_pair(scene.heights, at), l.gather_pair(scene.heights, l.iadd(at, l.int(scene.columns)))) };
+    let ((a, b), (c, d)) = unsafe {
+        (
+            l.gather_pair(inside, scene.heights, at),
+            l.gather_pair(inside, scene.heights, l.iadd(at, l.int(scene.columns))),
+        )
+    };
     let height = blend(l, [a, b, c, d], l.sub(x, l.float(column)), l.sub(y, l.float(row)));
     l.and(inside, l.lt(height, z))
 }

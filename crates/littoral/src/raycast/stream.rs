@@ -1,8 +1,8 @@
 //! Streams of independent rays: one ray a lane, each at its own level of the pyramid, lanes refilled as rays end.
 //!
 //! All lanes walk at once as in `walk.rs`: leave a node that lies wholly below the ray, else look closer. A lane that
-//! has come down to a patch waits there until enough others have, since testing a patch costs several times a step. Two
-//! packets take turns, so that one computes while the other waits for memory.
+//! has come down to a patch waits there until enough others have, since testing a patch costs several times a step. Three
+//! packets take turns, so that one computes while others wait for memory.
 //!
 //! There are two kinds of rays. Those *over the surface* start above it on a land without voids: they need the highs
 //! only, and being under the surface anywhere means that it was crossed. All others go by the *sheet*, where a crossing is
@@ -213,9 +213,10 @@ pub(super) trait Rays {
 const BELOW: f32 = -1.0;
 /// Lanes that must wait at patches before patches are tested, in sixteenths of all: more wastes waiting lanes, less wastes
 /// whole tests. The optimum is flat.
-const PATIENCE: u32 = 7;
+const PATIENCE: u32 = 9;
 
 /// As many rays as there are lanes.
+#[derive(Clone, Copy)]
 struct Packet<L: Lanes> {
     id: L::I,
     x: L::F,
@@ -380,22 +381,24 @@ impl<L: Lanes> Packet<L> {
         {
             let line = l.imul(l.shr(row, self.level), l.lookup(&scene.strides, self.level));
             let node = l.iadd(l.iadd(line, l.shr(column, self.level)), l.lookup(&scene.offsets, self.level));
-            let node = l.iselect(inner, node, zero);
+            // In steps of the pyramid.
+            let per_step = l.splat(scene.per_step);
+            let lowest = l.mul(l.sub(l.min(z0, z1), l.splat(scene.high_base)), per_step);
             // SAFETY: cells lie within the raster (kept by `Prepared::set` and the clamps below), so the node exists; the
             // arrays end with one number of padding.
-            let high_steps = unsafe { l.gather_u16(scene.highs, node) };
-            let high = l.add(l.mul(l.float(high_steps), l.splat(scene.step)), l.splat(scene.high_base));
-            clear = l.lt(high, l.min(z0, z1));
+            let high = l.float(unsafe { l.gather_u16(inner, scene.highs, node) });
+            clear = l.lt(high, lowest);
             if SHEET {
+                let highest = l.mul(l.sub(l.max(z0, z1), l.splat(scene.low_base)), per_step);
                 // SAFETY: as above.
-                let low_steps = unsafe { l.gather_u16(scene.lows, node) };
-                let low = l.add(l.mul(l.float(low_steps), l.splat(scene.step)), l.splat(scene.low_base));
-                clear = l.or(clear, l.or(l.lt(l.max(z0, z1), low), l.igt(low_steps, high_steps)));
+                let low = l.float(unsafe { l.gather_u16(inner, scene.lows, node) });
+                clear = l.or(clear, l.or(l.lt(highest, low), l.lt(high, low)));
             }
             wide = l.mask(0);
             if R::FOOTPRINT {
                 // As wide as the node, and on its way into it: met where it comes down to the top.
                 let side = l.float(l.shl(one, self.level));
+                let high = l.add(l.mul(high, l.splat(scene.step)), l.splat(scene.high_base));
                 wide = l.and(l.without(inner, clear), l.le(side, l.mul(self.spread, self.t)));
                 let falls = l.and(l.lt(self.dz, l.splat(0.0)), l.lt(high, z0));
                 let down = l.div(l.sub(high, self.z), l.select(falls, self.dz, l.splat(-1.0)));
@@ -408,12 +411,11 @@ impl<L: Lanes> Packet<L> {
         let patches = l.ieq(self.level, zero);
         let (waiting, walking) = (l.bits(patches), l.bits(inner));
         if waiting != 0 && (walking == 0 || waiting.count_ones() * 16 >= PATIENCE * L::COUNT as u32) {
-            let column = l.iselect(patches, column, zero);
-            let row = l.iselect(patches, row, zero);
             let here = l.iadd(l.imul(row, l.int(scene.columns)), column);
             // SAFETY: the patch exists, as above; it has a sample east, north and north-east of this one.
             let ((a, b), (c, d)) = unsafe {
-                (l.gather_pair(scene.heights, here), l.gather_pair(scene.heights, l.iadd(here, l.int(scene.columns))))
+                let there = l.iadd(here, l.int(scene.columns));
+                (l.gather_pair(patches, scene.heights, here), l.gather_pair(patches, scene.heights, there))
             };
             let (u0, v0, u1, v1, f0, f1);
             let east = l.sub(b, a);
@@ -562,7 +564,7 @@ pub(super) fn run<L: Lanes, R: Rays, const SHEET: bool, const ANY: bool>(l: L, s
     let mut block = Prepared::new();
     let mut cursor = 0;
     rays.next(l, scene, &mut block);
-    let mut packets = [Packet::empty(l), Packet::empty(l)];
+    let mut packets = [Packet::empty(l); 3];
     loop {
         let mut busy = false;
         for packet in &mut packets {

@@ -29,7 +29,7 @@ pub(super) const SIDE: usize = 4;
 /// Tests after which a beam is given up: about what its rays cost in the stream.
 const TESTS: u32 = 32;
 /// Width at which it is given up (cells).
-const WIDTH: f32 = 2.5;
+const WIDTH: f32 = 2.0;
 
 /// The rays of a beam, from one eye.
 pub(super) struct Beam<'a, L: Lanes> {
@@ -285,12 +285,13 @@ pub(super) fn walk<L: Lanes>(l: L, scene: &Scene, beam: &Beam<L>, outcome: &mut 
     }
     let corners = numbers.map(|of| [of[0], of[SIDE - 1], of[16 - SIDE], of[15]]);
     let least = corners.map(|[a, b, c, d]| smaller(smaller(a, b), smaller(c, d)));
-    let [slope_low, speed, mut fall_major, mut fall_minor] = least;
+    let [slope_low, speed, grade_major, grade_minor] = least;
+    let (mut fall_major, mut fall_minor) = (Fall::new(grade_major), Fall::new(grade_minor));
     let [a, b, c, d] = corners[0];
     let slope_high = larger(larger(a, b), larger(c, d));
     // For what rounding does to bounds.
     let hair = 0.004 + 2e-6 * (major.here.abs() + minor.here.abs());
-    let hair_up = 0.01 + 1e-6 * z.abs();
+    let sole = z - (0.01 + 1e-6 * z.abs());
 
     // Steps in the raster along the axes as mirrored.
     let (step_major, step_minor) = if eastward { (1, scene.columns) } else { (scene.columns, 1) };
@@ -310,8 +311,8 @@ pub(super) fn walk<L: Lanes>(l: L, scene: &Scene, beam: &Beam<L>, outcome: &mut 
         let (first, last) = (minor.first + whole(low, minor.most), minor.first + whole(high, minor.most));
         // None if the beam has not come to the map yet.
         let last = if high < 0.0 { minor.first - 1 } else { last };
-        let lowest = bound(z, (a, b), fall_major, hair_up);
-        if low > minor.most + 1.0 || lowest > scene.high && fall_major >= 0.0 {
+        let lowest = sole + fall_major.least(a, b);
+        if low > minor.most + 1.0 || lowest > scene.high && fall_major.rises() {
             break;
         }
         if beam.spread * b >= 2.0 * speed {
@@ -350,11 +351,13 @@ pub(super) fn walk<L: Lanes>(l: L, scene: &Scene, beam: &Beam<L>, outcome: &mut 
         let height = |at: i32| unsafe { *scene.heights.get_unchecked(at as usize) };
         let (mut row, mut tested) = (first, false);
         let (mut near, mut far) = if first <= last { (height(at), height(at + ahead)) } else { (0.0, 0.0) };
+        let mut highest = larger(near, far);
         while row <= last {
             let lines = (row as f32 - minor.at, (row + 1) as f32 - minor.at);
             let (near_aside, far_aside) = (height(at + aside), height(at + aside + ahead));
-            let lowest = larger(lowest, bound(z, (larger(lines.0, 0.0), lines.1), fall_minor, hair_up));
-            if larger(larger(near, far), larger(near_aside, far_aside)) > lowest {
+            let lowest = larger(lowest, sole + fall_minor.least(larger(lines.0, 0.0), lines.1));
+            let highest_aside = larger(near_aside, far_aside);
+            if larger(highest, highest_aside) > lowest {
                 let patch = Patch {
                     near,
                     along: far - near,
@@ -376,7 +379,7 @@ pub(super) fn walk<L: Lanes>(l: L, scene: &Scene, beam: &Beam<L>, outcome: &mut 
                     break;
                 }
             }
-            (near, far) = (near_aside, far_aside);
+            (near, far, highest) = (near_aside, far_aside, highest_aside);
             (at, row) = (at + aside, row + 1);
         }
         let left = bits(l, [rays[0].open, rays[1].open]);
@@ -386,11 +389,13 @@ pub(super) fn walk<L: Lanes>(l: L, scene: &Scene, beam: &Beam<L>, outcome: &mut 
             }
             // Those that are left are the higher ones, as a rule.
             open = left;
-            (fall_major, fall_minor) = (f32::INFINITY, f32::INFINITY);
+            let mut grades = [f32::INFINITY; 2];
             for rays in &rays[..halves] {
-                fall_major = smaller(fall_major, l.least(l.select(rays.open, rays.grades[0], never)));
-                fall_minor = smaller(fall_minor, l.least(l.select(rays.open, rays.grades[1], never)));
+                for (least, &grade) in grades.iter_mut().zip(&rays.grades) {
+                    *least = smaller(*least, l.least(l.select(rays.open, grade, never)));
+                }
             }
+            (fall_major, fall_minor) = (Fall::new(grades[0]), Fall::new(grades[1]));
         }
         strip = next;
         level = i32::from(!tested && (strip + major.base) & 1 == 0 && scene.top > 0);
@@ -414,11 +419,31 @@ pub(super) fn walk<L: Lanes>(l: L, scene: &Scene, beam: &Beam<L>, outcome: &mut 
     }
 }
 
-/// The least height of rays from height `z` that rise by at least `grade` a cell, between two distances in cells.
-#[inline(always)]
-fn bound(z: f32, (a, b): (f32, f32), grade: f32, hair: f32) -> f32 {
-    let (a, b) = (a * grade, b * grade);
-    z + smaller(a, b) - (hair + 1e-6 * larger(a.abs(), b.abs()))
+/// How the lowest of some rays rises or falls along an axis: its height where it has come to either end of a piece of the way, as a share of each.
+#[derive(Clone, Copy)]
+struct Fall {
+    from: f32,
+    to: f32,
+}
+
+impl Fall {
+    /// For rays that rise by at least `grade` (m) a cell.
+    #[inline(always)]
+    fn new(grade: f32) -> Fall {
+        // Lowest at the end if they fall, else at the beginning; and a millionth lower, for what rounding does.
+        if grade < 0.0 { Fall { from: 0.0, to: grade * (1.0 + 1e-6) } } else { Fall { from: grade, to: -1e-6 * grade } }
+    }
+
+    /// The least rise (m) from the eye to a place between two distances (cells), of which the first is not negative.
+    #[inline(always)]
+    fn least(self, from: f32, to: f32) -> f32 {
+        from * self.from + to * self.to
+    }
+
+    #[inline(always)]
+    fn rises(self) -> bool {
+        self.from > 0.0 || self.to == 0.0
+    }
 }
 
 /// `b` unless `a > b`: one instruction, unlike [`f32::max`].
