@@ -13,7 +13,7 @@ pub fn shielded(arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
             verbatim |= text == "--";
             let negative = text.strip_prefix('-').is_some_and(|rest| {
                 rest.starts_with(|c: char| c.is_ascii_digit() || c == '.')
-                    && rest.chars().all(|c| c.is_ascii_digit() || "+-.,eE".contains(c))
+                    && rest.chars().all(|c| c.is_ascii_digit() || "+-.,eE=".contains(c))
             });
             if negative && !verbatim { format!(" {text}").into() } else { argument }
         })
@@ -165,10 +165,11 @@ mod tests {
 
     #[test]
     fn negative_numbers_are_shielded_and_nothing_else() {
-        let words = ["littoral", "-155.2,19.4", "-5", "-.5,1e-3", "--json", "-h", "-1.tif", "--", "-3"];
+        let words = ["littoral", "-155.2,19.4", "-122,46=-430", "-5", "-.5,1e-3", "--json", "-h", "-1.tif", "--", "-3"];
         let after: Vec<String> =
             shielded(words.iter().map(OsString::from)).into_iter().map(|w| w.into_string().expect("text")).collect();
-        let expected = ["littoral", " -155.2,19.4", " -5", " -.5,1e-3", "--json", "-h", "-1.tif", "--", "-3"];
+        let expected =
+            ["littoral", " -155.2,19.4", " -122,46=-430", " -5", " -.5,1e-3", "--json", "-h", "-1.tif", "--", "-3"];
         assert_eq!(after, expected);
     }
 

@@ -11,6 +11,7 @@ mod ground;
 mod height;
 mod info;
 mod input;
+mod lakes;
 mod mesh;
 mod objects;
 mod plot;

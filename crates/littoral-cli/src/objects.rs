@@ -44,7 +44,7 @@ pub fn standing(
             footing: Footing::Surface,
             object,
         };
-        if standing.pose(&subject.land, subject.water.as_ref(), None).is_none() {
+        if standing.pose(&subject.land, subject.water.as_ref(), subject.lakes.as_ref(), None).is_none() {
             return Err(Failure::Work(format!(
                 "--object {}@{},{}: expected ground or water of {} there, got none (void or outside); move it",
                 order.file.display(),

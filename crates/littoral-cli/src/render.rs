@@ -4,6 +4,7 @@ use crate::detail::{Detail, Drawer, Told};
 use crate::film;
 use crate::ground::{Frame, Reading, System};
 use crate::input::{self, Target, WaterLevel};
+use crate::lakes::{self, Lake};
 use crate::objects;
 use crate::subject::Subject;
 use crate::sun::SunChoice;
@@ -15,8 +16,8 @@ use littoral::field::{Sea, coast};
 use littoral::picture::{self, Border, Climate, Display, Picture, Scene, Settings, Shot, Stage};
 use littoral::space::{Ray, View};
 use littoral::waves::SeaState;
-use littoral_data::ObjectOrder;
 use littoral_data::write::{self, Layer, PngPixels};
+use littoral_data::{LakeOrder, ObjectOrder};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -42,6 +43,7 @@ use std::time::Instant;
   littoral render dem.tif --lod quadtree --tolerance 2 --wireframe      the mesh that a method of detail draws
   littoral render --object lighthouse@3690,1000            with a lighthouse on the headland
   littoral render dem.tif --object boat.glb@562900,5109300,135    with a boat of your own that heads south-east
+  littoral render dem.tif --lake 35.5,31.4=-430 --lonlat  the Dead Sea, whose bed the file holds, at its level
   littoral render --gpu                                    drawn by the graphics card, the same exact surface
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film
@@ -97,6 +99,10 @@ pub struct Render {
     /// and voids with a rim at that height
     #[arg(long, value_name = "METRES|none", value_parser = input::water, default_value = "0", help_heading = "Look")]
     water: WaterLevel,
+    /// A lake over a known bed, or a reservoir: a place in it, as --eye counts, and how high it stands in metres; what is lower and joined to that
+    /// place is under water. Fails where it would run out, and says at which level. Can be given many times
+    #[arg(long, value_name = "X,Y=LEVEL", help_heading = "Look")]
+    lake: Vec<LakeOrder>,
     /// The waves on the sea: wind=15,from=240 (m/s, and where it blows from), hs=2,tp=9 (height and period), beaufort=6, douglas=4 or calm;
     /// buoy=FILE (an NDBC spectrum); more with fetch=KM, swell=HEIGHT@PERIOD/FROM, model=, gamma=, spread=, depth=, breaking=, seed=
     /// [default: calm; the built-in coast: beaufort=4,from=225]
@@ -196,6 +202,9 @@ struct Answer {
     hs: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     time: Option<f64>,
+    /// The lakes that were filled, if any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    lakes: Vec<Lake>,
     /// How many objects there are, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     objects: Option<usize>,
@@ -222,7 +231,8 @@ impl Render {
 
         let state = self.sea.as_deref().map(|spec| sea::read(spec, talk)).transpose()?;
         let (reading, full, stretch) = (self.reading, self.full, self.exaggeration);
-        let subject = Subject::open(&self.files, reading, full, stretch, self.water, talk)?;
+        let mut subject = Subject::open(&self.files, reading, full, stretch, self.water, talk)?;
+        let lakes = lakes::fill(&self.lake, System::of(self.lonlat), &mut subject, talk)?;
         let (mut shot, look) = self.shot(&subject, self.files.is_empty(), talk)?;
         let film = self.film(&out, &shot, state.as_ref());
         if let Some(film) = &film {
@@ -286,6 +296,7 @@ impl Render {
                 seed: self.seed,
                 hs: sea.as_ref().map(|_| state.clone().unwrap_or_else(coast::sea_state).significant_height()),
                 time: sea.as_ref().map(Sea::time),
+                lakes,
                 objects: Some(objects.len()).filter(|&count| count > 0),
                 passes: passes.map(|p| p.display().to_string()),
                 mesh: chosen,
@@ -332,14 +343,15 @@ impl Render {
             out: &out.file,
             folder: out.kind == Kind::Frames,
             look: format!(
-                "{:?} {:?} {:?} water {:?} sea {sea:?} time {}{}{}",
+                "{:?} {:?} {:?} water {:?} sea {sea:?} time {}{}{}{}",
                 shot.sun,
                 shot.air,
                 shot.style,
                 self.water,
                 self.time,
                 if self.detail.is_default() { String::new() } else { format!(" {:?}", self.detail) },
-                if self.object.is_empty() { String::new() } else { format!(" {:?}", self.object) }
+                if self.object.is_empty() { String::new() } else { format!(" {:?}", self.object) },
+                if self.lake.is_empty() { String::new() } else { format!(" {:?}", self.lake) }
             ),
             field: self.fov.map_or(LENS, f64::to_radians),
             size: self.size,

@@ -102,6 +102,7 @@ impl Subject {
     pub fn surface(&self, local: DVec2) -> Option<f64> {
         let ground = height_at(&self.land, local).map(f64::from);
         let water = self.water.as_ref().filter(|water| water.covers(local)).map(|water| water.level);
+        let water = water.or_else(|| self.lakes.as_ref()?.at(&self.land, local).map(|lake| lake.level));
         match (ground, water) {
             (Some(ground), Some(water)) => Some(ground.max(water)),
             (ground, water) => ground.or(water),

@@ -34,6 +34,7 @@ mod error;
 pub mod formats;
 mod georeference;
 mod image;
+mod lake;
 #[cfg(feature = "lod")]
 pub mod lod;
 mod mosaic;
@@ -53,6 +54,7 @@ pub use drape::open_drape;
 pub use error::Error;
 pub use formats::tiles::{Code, Encoding};
 pub use georeference::{Georeference, Registration, metres_per_degree};
+pub use lake::LakeOrder;
 pub use mosaic::{Mosaic, name_of_all, open_all};
 pub use object::{ObjectFile, ObjectOrder, object_from, open_object};
 pub use source::{

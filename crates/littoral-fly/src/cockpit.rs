@@ -140,7 +140,7 @@ impl Cockpit {
         let mut camera = Camera::new(DVec3::new(0.0, 0.0, 1000.0), DVec3::Y);
         camera.speed = settings.speed;
         Cockpit {
-            order: Order { files, exaggeration: settings.exaggeration, objects: Vec::new() },
+            order: Order { files, exaggeration: settings.exaggeration, lakes: Vec::new(), objects: Vec::new() },
             sea_text: settings.sea.clone(),
             surf: None,
             picture_text: settings.laid.as_ref().map_or(String::new(), |laid| laid.picture.display().to_string()),
@@ -204,7 +204,7 @@ impl Cockpit {
                 // What was there is flown on; where nothing was, the built-in coast.
                 self.order = match &self.subject {
                     Some(subject) => subject.order.clone(),
-                    None => Order { files: Vec::new(), exaggeration: 1.0, objects: Vec::new() },
+                    None => Order { files: Vec::new(), exaggeration: 1.0, lakes: Vec::new(), objects: Vec::new() },
                 };
                 self.settings.exaggeration = self.order.exaggeration;
                 if let Some(picture) = laid {
@@ -568,7 +568,8 @@ impl Cockpit {
     /// Opens files as one land.
     pub fn open(&mut self, files: Vec<PathBuf>) {
         self.order.files = files;
-        // They stood on the land before.
+        // They belonged to the land before.
+        self.order.lakes.clear();
         self.order.objects.clear();
         self.working = Some(("opening".to_owned(), 0.0));
     }

@@ -35,7 +35,7 @@ use clap::Parser;
 use detail::Detail;
 use glam::UVec2;
 use littoral::lod::Method;
-use littoral_data::ObjectOrder;
+use littoral_data::{LakeOrder, ObjectOrder};
 use settings::{Laid, Settings, Show, Split, Style};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -76,6 +76,9 @@ struct Arguments {
     /// how many degrees it is turned clockwise, and how many times larger it is. Can be given many times; natural pictures show it
     #[arg(long, value_name = "FILE@X,Y[,HEADING[,SCALE]]")]
     object: Vec<ObjectOrder>,
+    /// A lake over a known bed, or a reservoir: a place in it, in the coordinates of the height files, and how high it stands in metres. Can be given many times
+    #[arg(long, value_name = "X,Y=LEVEL", allow_hyphen_values = true)]
+    lake: Vec<LakeOrder>,
     /// A path to be flown at once
     #[arg(long, value_name = "FILE.toml")]
     path: Option<PathBuf>,

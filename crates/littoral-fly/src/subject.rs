@@ -1,13 +1,13 @@
 //! The land that is flown over, its water, and how its coordinates are told to people.
 
 use glam::{DAffine2, DVec2, DVec3};
-use littoral::field::{Lakes, Land, Water, coast};
+use littoral::field::{LakeError, Lakes, Land, Water, coast};
 use littoral::flight::FlightPath;
 use littoral::objects::{Footing, Standing};
 use littoral::picture::Drape;
 use littoral::space::{Ray, View};
 use littoral_data::path::{Coordinates, SavedPath};
-use littoral_data::{Crs, Georeference, LoadOptions, ObjectOrder, VerticalDatum};
+use littoral_data::{Crs, Georeference, LakeOrder, LoadOptions, ObjectOrder, VerticalDatum};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,6 +18,8 @@ pub struct Order {
     pub files: Vec<PathBuf>,
     /// By how much heights are stretched.
     pub exaggeration: f64,
+    /// Lakes to be filled over their beds.
+    pub lakes: Vec<LakeOrder>,
     /// What is to stand on it.
     pub objects: Vec<ObjectOrder>,
 }
@@ -119,8 +121,27 @@ impl Subject {
             georeference,
             crs_from_local,
         };
+        subject.fill_lakes();
         subject.place_objects(told);
         Ok(subject)
+    }
+
+    /// Fills the lakes that are ordered. What cannot be filled is left out; a note says why.
+    fn fill_lakes(&mut self) {
+        let factor = self.order.exaggeration;
+        for order in &self.order.lakes {
+            let near = self.georeference.as_ref().map_or(order.at, |georeference| georeference.near(order.at));
+            let at = self.crs_from_local.inverse().transform_point2(near);
+            let lakes = self.lakes.get_or_insert_with(|| Lakes::none(&self.land));
+            if let Err(error) = lakes.fill(&self.land, self.water.as_ref(), at, order.level * factor) {
+                let place = match error {
+                    LakeError::Overflows { outlet, .. } => format!("; its outlet is at {}", self.shown(outlet.at)),
+                    _ => String::new(),
+                };
+                let (x, y, error) = (order.at.x, order.at.y, error.stretched(1.0 / factor));
+                self.notes.push(format!("the lake at {x},{y}: {error}{place}"));
+            }
+        }
     }
 
     /// Opens the objects that are ordered, each file once. What cannot stand is left out; a note says why.
@@ -148,7 +169,7 @@ impl Subject {
                 scale: order.scale,
                 footing: Footing::Surface,
             };
-            match standing.pose(&self.land, self.water.as_ref(), None) {
+            match standing.pose(&self.land, self.water.as_ref(), self.lakes.as_ref(), None) {
                 Some(_) => self.objects.push(standing),
                 None => self
                     .notes
@@ -209,6 +230,12 @@ impl Subject {
             let distance = (water.level - view.eye.z) / direction.z;
             let at = view.eye + direction * distance;
             (distance > 0.0 && distance < REACH && water.covers(at.truncate())).then_some((distance, at))
+        });
+        // A lake over a bed is seen where the ray comes down to it.
+        let ground = ground.map(|(distance, at)| {
+            let lake = self.lakes.as_ref().and_then(|lakes| lakes.at(&self.land, at.truncate()));
+            let above = lake.map_or(0.0, |lake| ((lake.level - view.eye.z) / direction.z).clamp(0.0, distance));
+            if above > 0.0 { (above, view.eye + direction * above) } else { (distance, at) }
         });
         ground.into_iter().chain(level).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
     }

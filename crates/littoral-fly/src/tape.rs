@@ -69,8 +69,11 @@ mod tests {
 
     #[test]
     fn a_tape_is_the_flight() {
-        let subject = Subject::open(&Order { files: Vec::new(), exaggeration: 1.0, objects: Vec::new() }, &|_, _| {})
-            .expect("the coast");
+        let subject = Subject::open(
+            &Order { files: Vec::new(), exaggeration: 1.0, lakes: Vec::new(), objects: Vec::new() },
+            &|_, _| {},
+        )
+        .expect("the coast");
         let land = &subject.land;
         let path = FlightPath::around(land.origin(), land.extent(), land.height_range(), 20.0);
         let tape = Tape::of(&path, &subject, Tape::RATE).expect("flies");

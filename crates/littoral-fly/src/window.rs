@@ -118,6 +118,7 @@ impl Flight {
         context.set_visuals_of(egui::Theme::Dark, visuals);
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &window, None, None, None);
         let mut cockpit = Cockpit::new(app.settings.clone(), arguments.files.clone());
+        cockpit.order.lakes.clone_from(&arguments.lake);
         cockpit.order.objects.clone_from(&arguments.object);
         if paint.gpu.is_software() && arguments.coarse.is_none() && cockpit.settings.coarse == 1 {
             // Without a graphics card, light for every pixel of a window takes too long.

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat2, DVec2, UVec2, Vec2, Vec3};
-use littoral::field::Finest;
+use littoral::field::{Finest, Lakes};
 use littoral::picture::Streaks;
 use littoral::space::View;
 
@@ -24,6 +24,8 @@ struct Noise {
 
 /// Room for noises.
 const NOISES: usize = 56;
+/// Room for levels of lakes, by four.
+const LAKE_LEVELS: usize = Lakes::MOST_FILLED / 4;
 /// Room for coarser levels of heights.
 pub(crate) const LEVELS: usize = 14;
 
@@ -57,6 +59,7 @@ pub(crate) struct Uniforms {
     drape: [f32; 4],
     sea: [f32; 4],
     run_up: [f32; 4],
+    lake_levels: [[f32; 4]; LAKE_LEVELS],
     open: [[f32; 4]; 9],
     noise: [Noise; NOISES],
 }
@@ -265,6 +268,9 @@ impl Uniforms {
             drape: drape.0,
             sea: [flag(waves.is_some()), finest.variance, 0.0, 0.0],
             run_up: waves.map_or([0.0; 4], |waves| place(waves.run_up.1, waves.run_up.2)),
+            lake_levels: std::array::from_fn(|i| {
+                std::array::from_fn(|k| scenery.lake_levels.get(4 * i + k).copied().unwrap_or_default())
+            }),
             open: scenery.open.map(|light| four(light, 0.0)),
             noise,
         }

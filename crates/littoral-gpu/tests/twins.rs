@@ -203,7 +203,7 @@ fn maps_and_pictures_look_as_rays_see_them() {
 #[test]
 fn a_block_with_missing_corners_looks_as_rays_see_it() {
     let Some(gpu) = gpu() else { return };
-    // Hills, a sea in the west, a lake in the middle; two corners are void.
+    // Hills, a sea in the west, a lake in the middle, another with a known bed in the east; two corners are void.
     let (side, spacing) = (193, 30.0);
     let fbm = Fbm::new(2200.0, 260.0, 8, 3);
     let height = |i: usize| {
@@ -211,11 +211,14 @@ fn a_block_with_missing_corners_looks_as_rays_see_it() {
         let at = DVec2::new(x, y) * spacing;
         let corner = x + y < 40.0 || x + y > 350.0;
         let away = (at - DVec2::splat(96.0 * spacing)).length();
+        let bowl = (at - DVec2::new(150.0, 60.0) * spacing).length();
         let hills = fbm.at(at).value + 1.4 * x - 60.0;
         match () {
             _ if corner => f32::NAN,
             _ if away < 500.0 => 60.0,
             _ if away < 650.0 => hills.max(80.0) as f32,
+            _ if bowl < 500.0 => (60.0 + 100.0 * (bowl / 500.0).powi(2)) as f32,
+            _ if bowl < 650.0 => hills.max(170.0) as f32,
             _ => hills as f32,
         }
     };
@@ -223,17 +226,57 @@ fn a_block_with_missing_corners_looks_as_rays_see_it() {
     let raster = Raster::new(side, side, DVec2::splat(spacing), heights).expect("valid");
     let land = Land::new(raster);
     let water = Water::flood(&land, 0.0);
-    let lakes = Lakes::find(&land, water.as_ref());
-    assert!(water.is_some() && lakes.is_some());
+    let mut lakes = Lakes::find(&land, water.as_ref()).expect("a lake");
+    lakes.fill(&land, water.as_ref(), DVec2::new(54.0, -36.0) * spacing, 150.0).expect("a bowl that holds");
     let size = UVec2::new(256, 144);
     let shot = overhead(&land, water.as_ref(), size);
     let eye = DVec3::new(-4000.0, -8000.0, 4500.0);
     let view = View::looking_at(eye, DVec3::ZERO, 0.6, size);
-    let scene = Scene { lakes: lakes.as_ref(), ..Scene::for_shot(&land, water.as_ref(), &shot) };
+    let scene = Scene { lakes: Some(&lakes), ..Scene::for_shot(&land, water.as_ref(), &shot) };
     for (name, style, most) in [("block", Style::Natural, (4.0, 0.03)), ("relief block", Style::Relief, (1.0, 0.01))] {
         let scene = Scene { style, border: Border::Cut, sun: Sun::new(4.2, 0.5), ..scene };
         let stage = Stage::new(&scene);
         let mut painter = Painter::new(gpu.clone(), &stage).expect("a known style");
         compare(name, &stage, &mut painter, None, &view, most);
+    }
+}
+
+#[test]
+fn lakes_over_known_beds_look_as_rays_see_them() {
+    let Some(gpu) = gpu() else { return };
+    // A valley in hills, dammed in the south: deep in the middle, with an island; its level is below the sea's, which is elsewhere.
+    let (side, spacing) = (161, 20.0);
+    let fbm = Fbm::new(700.0, 60.0, 7, 11);
+    let height = |i: usize| {
+        let (x, y) = ((i % side) as f64 * spacing, (i / side) as f64 * spacing);
+        let across = (x - 1600.0 - 350.0 * (y / 600.0).sin()) / 700.0;
+        let valley = -380.0 + 190.0 * across * across + 0.05 * (y - 300.0) + fbm.at(DVec2::new(x, y)).value;
+        let dam = if (300.0..360.0).contains(&y) && across.abs() < 2.0 { -240.0 } else { valley };
+        let island = -240.0 - 0.5 * (DVec2::new(x, y) - DVec2::new(1750.0, 1250.0)).length();
+        valley.max(dam).max(island) as f32
+    };
+    let heights: Vec<f32> = (0..side * side).map(height).collect();
+    let land = Land::new(Raster::new(side, side, DVec2::splat(spacing), heights).expect("valid"));
+    let mut lakes = Lakes::none(&land);
+    let middle = DVec2::new(0.0, -700.0);
+    let lake = lakes.fill(&land, None, middle, -270.0).expect("a valley that holds");
+    assert!(lake.deepest > 60.0 && lake.area > 1e6, "{lake:?}");
+    let size = UVec2::new(256, 144);
+    let shot = overhead(&land, None, size);
+    let scene = Scene { lakes: Some(&lakes), ..Scene::for_shot(&land, None, &shot) };
+    let high = View::looking_at(DVec3::new(700.0, -2500.0, 900.0), middle.extend(-270.0), 0.7, size);
+    let low = View::looking_at(DVec3::new(0.0, -1150.0, -250.0), DVec3::new(150.0, 300.0, -290.0), 0.8, size);
+    let down = View::looking_at(middle.extend(900.0), middle.extend(-270.0) + DVec3::Y, 0.9, size);
+    // Rough slopes and, from low down, ripples differ from ray to ray.
+    for (name, view, style, far) in [
+        ("reservoir", high, Style::Natural, 0.04),
+        ("on the reservoir", low, Style::Natural, 0.04),
+        ("reservoir from above", down, Style::Natural, 0.04),
+        ("map of the reservoir", down, Style::Tint, 0.03),
+    ] {
+        let scene = Scene { style, border: Border::Mist, sun: Sun::new(4.2, 0.6), ..scene };
+        let stage = Stage::new(&scene);
+        let mut painter = Painter::new(gpu.clone(), &stage).expect("a known style");
+        compare(name, &stage, &mut painter, None, &view, (4.0, far));
     }
 }

@@ -74,11 +74,12 @@ fn what_stands_in_water_shows_above_it_and_what_floats_lies_on_it() {
     let water = Water::flood(&land, 0.0).expect("a sea");
     let pile = block(Vec3::new(15.0, 15.0, 10.0), Vec3::Z * 10.0, Vec3::splat(0.5));
     let at = DVec2::new(1000.0, 700.0);
-    let pose =
-        |footing| Standing { footing, ..Standing::at(&pile, at) }.pose(&land, Some(&water), None).expect("somewhere");
+    let pose = |footing| {
+        Standing { footing, ..Standing::at(&pile, at) }.pose(&land, Some(&water), None, None).expect("somewhere")
+    };
     assert_eq!(pose(Footing::Ground).origin, at.extend(-8.0));
     assert_eq!(pose(Footing::Surface).origin, at.extend(0.0));
-    assert_eq!(Standing::at(&pile, DVec2::new(1e5, 2e5)).pose(&land, None, None), None);
+    assert_eq!(Standing::at(&pile, DVec2::new(1e5, 2e5)).pose(&land, None, None, None), None);
 
     let view = View::looking_at(DVec3::new(1000.0, 400.0, 40.0), at.extend(0.0), 0.4, UVec2::new(120, 90));
     let objects = [Standing { footing: Footing::Ground, ..Standing::at(&pile, at) }];
@@ -98,7 +99,7 @@ fn what_floats_rises_and_leans_with_the_waves() {
     let (mut low, mut high, mut leaning) = (f64::INFINITY, f64::NEG_INFINITY, 0f32);
     for second in 0..30 {
         sea.set_time(f64::from(second));
-        let pose = buoy.pose(&land, Some(&water), Some(&sea)).expect("afloat");
+        let pose = buoy.pose(&land, Some(&water), None, Some(&sea)).expect("afloat");
         let surface = sea.surface_at(buoy.place, 2.4);
         assert!((pose.origin.z - surface.height).abs() < 1e-9);
         let normal = Vec3::new(-surface.slope.x, -surface.slope.y, 1.0).normalize();
@@ -115,7 +116,7 @@ fn it_turns_clockwise_and_stands_on_the_full_data_whatever_is_drawn() {
     let place = DVec2::new(1003.0, 907.0);
     let bar = block(Vec3::new(1.0, 20.0, 5.0), Vec3::new(0.0, 20.0, 45.0), Vec3::new(0.6, 0.02, 0.02));
     let east = Standing { heading: 90f64.to_radians(), ..Standing::at(&bar, place) };
-    let pose = east.pose(&land, None, None).expect("on the ground");
+    let pose = east.pose(&land, None, None, None).expect("on the ground");
     assert_eq!(pose.origin.z, f64::from(land.height_at(place).expect("known")));
     let tip = pose.world(Vec3::new(0.0, 40.0, 45.0));
     assert!((tip - pose.origin).distance(DVec3::new(40.0, 0.0, 45.0)) < 1e-4, "{tip}");
@@ -169,7 +170,7 @@ fn sun_and_the_shadow_of_the_land_fall_on_it() {
 fn far_away_a_coarse_form_does() {
     let lighthouse = Arc::new(lighthouse());
     let land = land(|_| 0.0);
-    let pose = Standing::at(&lighthouse, DVec2::new(1000.0, 1000.0)).pose(&land, None, None).expect("somewhere");
+    let pose = Standing::at(&lighthouse, DVec2::new(1000.0, 1000.0)).pose(&land, None, None, None).expect("somewhere");
     let form = |distance: f64, tolerance_pixels: f32| {
         let eye = DVec3::new(1000.0, 1000.0 - distance, 10.0);
         let view = View::looking_at(eye, DVec3::new(1000.0, 1000.0, 10.0), 0.8, UVec2::new(1280, 720));

@@ -12,7 +12,7 @@ fn is_map() -> bool {
 
 // Albedo of a map at a place and height over the sea (m).
 fn tint_at(rel: vec2f, z: f32) -> vec3f {
-    if lake_at(rel) >= 0.0 {
+    if lake_at(rel).depth >= 0.0 {
         return frame.lake.rgb;
     }
     let level = frame.water.x + frame.eye.z;
@@ -87,7 +87,7 @@ fn hsl(hue: f32, saturation: f32, lightness: f32) -> vec3f {
 
 // Reflectance of a shaded relief at a place and height over the sea (m), for a pixel of this footprint (m).
 fn relief_at(rel: vec2f, z: f32, footprint: f32) -> vec3f {
-    if lake_at(rel) >= 0.0 {
+    if lake_at(rel).depth >= 0.0 {
         return frame.lake.rgb;
     }
     let level = frame.tint.y;

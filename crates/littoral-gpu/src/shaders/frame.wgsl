@@ -66,6 +66,8 @@ struct Frame {
     sea: vec4f,
     // The eye among the points of the map of run-up; points a metre.
     run_up: vec4f,
+    // Levels of the lakes that were filled (m).
+    lake_levels: array<vec4f, 8>,
     // Harmonics of the light over an open plain.
     open: array<vec4f, 9>,
     noise: array<Noise, 56>,

@@ -54,7 +54,8 @@ fn ground_at(piece: Piece) -> Ground {
         broad = surface_at(piece.rel, 4.0 * frame.eye.w);
     }
     let level = frame.water.x + frame.eye.z;
-    let near_water = frame.water.y > 0.0 && (piece.z < level + 15.0 || covers(piece.rel));
+    // Dry ground below the sea's level is not by the sea.
+    let near_water = frame.water.y > 0.0 && (piece.z >= level && piece.z < level + 15.0 || covers(piece.rel));
     let above = select(1e9, piece.z - level, near_water);
     var run_up = 0.0;
     if above > -1.0 && above < 3.0 {
@@ -166,15 +167,22 @@ struct Water {
     under: vec2f,
     // Cosine of the bent ray.
     down: f32,
-    // Distance to the shore of a lake (m), negative for the sea.
-    lake: f32,
+    lake: Lake,
     // Unit vector to what is mirrored, how much of it comes back, and how far away it is (m), negative for the sky.
     mirrored: vec3f,
     share: f32,
     reach: f32,
 }
 
-fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: f32, pixel: vec2f, waving: bool) -> Water {
+// Depth of a lake or of the still sea at a place (m).
+fn depth_of(rel: vec2f, lake: Lake) -> f32 {
+    if lake.depth < 0.0 {
+        return depth_at(rel);
+    }
+    return select(lake.depth, lake.level - mean_of(sample_of(rel), 0u), lake.is_sounded);
+}
+
+fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: Lake, pixel: vec2f, waving: bool) -> Water {
     let eye = -direction;
     let footprint = footprint_of(distance, eye.z);
     var ripples: Ripples;
@@ -197,10 +205,10 @@ fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: f32, pixel: vec2f
     let down = max(-within.z, 0.3);
     let aside = within.xy / down;
     var under = rel.xy;
-    var depth = max(depth_at(rel.xy) + raised, 0.0);
+    var depth = max(depth_of(rel.xy, lake) + raised, 0.0);
     for (var i = 0; i < 3; i++) {
         under = rel.xy + aside * min(depth, 60.0);
-        depth = 0.5 * (depth + max(depth_at(under) + raised, 0.0));
+        depth = 0.5 * (depth + max(depth_of(under, lake) + raised, 0.0));
     }
     if waving && depth < 0.25 {
         // What waves carry with them as they run up a beach.
@@ -215,11 +223,16 @@ fn water_at(direction: vec3f, rel: vec3f, distance: f32, lake: f32, pixel: vec2f
     mirrored.z = select(max(mirrored.z, 0.004), 0.02 - 0.5 * mirrored.z, mirrored.z < 0.0);
     mirrored = normalize(mirrored);
     let reach = march(rel.xy, frame.eye.z + rel.z, mirrored);
-    if lake >= 0.0 {
-        // Of a lake only the surface is known: its bed falls off from the shore.
-        depth = min(0.07 * lake, 30.0);
-    }
     return Water(ripples, foam, rest, footprint, depth, under, down, lake, mirrored, fresnel(dot(facet, eye)), reach);
+}
+
+// What the beds of lakes throw back.
+const LAKE_MUD = vec3f(0.09, 0.08, 0.055);
+
+// How much of the sun in the water a piece of bed faces.
+fn facing_of(normal: vec3f) -> f32 {
+    let sun_within = -refracted(-frame.sun.xyz, vec3f(0.0, 0.0, 1.0));
+    return clamp(dot(normal, sun_within) / max(sun_within.z, 0.2), 0.3, 1.5);
 }
 
 @fragment
@@ -269,10 +282,32 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
             rel = direction * t;
         }
     }
-    var lake = -1.0;
-    if !is_water && distance < 1e29 && !is_map() {
+    var lake = NO_LAKE;
+    if !is_water && distance < 1e29 && !is_map() && !is_side(rel.xy) {
         lake = lake_at(rel.xy);
-        is_water = lake >= 0.0 && !is_side(rel.xy);
+        is_water = lake.depth >= 0.0;
+    }
+    if is_water && lake.is_sounded {
+        // From where it comes down to the level to the bed a ray stays within the lake.
+        let rise = frame.eye.z - lake.level;
+        let t = -rise / direction.z;
+        let at = direction * t;
+        if rise <= 0.0 {
+            is_water = false;
+        } else if t <= 0.0 || t > distance * (1.0 + 1e-5) {
+            // A mesh may lie above water.
+            rel.z = -rise;
+        } else if lake_at(at.xy).depth >= 0.0 {
+            rel = at;
+            distance = t;
+        } else {
+            // A mesh that cuts off the shore, or the side of a void.
+            is_water = false;
+            if known_at(at.xy) > 0.0 {
+                rel = at;
+                distance = t;
+            }
+        }
     }
     if !is_water && has_block() {
         let is_ground = distance < 1e29;
@@ -310,12 +345,20 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let footprint = max(footprint_of(distance, -direction.z), 0.6 * length(water.under - inside));
         pieces[0] = Piece(inside, frame.water.x + frame.eye.z - water.depth, footprint);
         pieces[1] = Piece(rel.xy + water.mirrored.xy * water.reach, frame.eye.z + rel.z + water.mirrored.z * water.reach, 2.0 * frame.eye.w);
-        wanted = vec2<bool>((water.depth < 45.0 && lake < 0.0), (water.reach > 0.0));
+        wanted = vec2<bool>((water.depth < 45.0 && lake.depth < 0.0), (water.reach > 0.0));
     } else if known_at(rel.xy) > 0.0 {
         pieces[0] = piece_seen(direction, rel, distance);
         wanted.x = true;
     }
-    var bed = select(vec3f(0.1), vec3f(0.09, 0.08, 0.055), lake >= 0.0);
+    var bed = vec3f(0.1);
+    if is_water && lake.depth >= 0.0 {
+        if !lake.is_sounded {
+            bed = LAKE_MUD;
+        } else if water.depth < 45.0 {
+            let normal = normal_of_slope(surface_at(pieces[0].rel, pieces[0].footprint).slope);
+            bed = mix(bed, LAKE_MUD * facing_of(normal), known_at(pieces[0].rel));
+        }
+    }
     var mirrored_land = vec3f(0.0);
     for (var i = 0; i < 2; i++) {
         if !wanted[i] {
@@ -324,9 +367,7 @@ fn shade(@builtin(position) position: vec4f) -> @location(0) vec4f {
         let piece = pieces[i];
         let ground = ground_at(piece);
         if is_water && i == 0 {
-            let sun_within = -refracted(-frame.sun.xyz, vec3f(0.0, 0.0, 1.0));
-            let facing = clamp(dot(ground.material.normal, sun_within) / max(sun_within.z, 0.2), 0.3, 1.5);
-            bed = mix(vec3f(0.1), ground.material.albedo * facing, known_at(piece.rel));
+            bed = mix(vec3f(0.1), ground.material.albedo * facing_of(ground.material.normal), known_at(piece.rel));
             continue;
         }
         let back = lit(piece, ground, select(direction, water.mirrored, is_water));
@@ -352,7 +393,7 @@ fn water_seen(water: Water, direction: vec3f, rel: vec3f, bed: vec3f, mirrored_l
     let direct_share = select(1.0, sun_seen(rel.xy), all(rel.xy >= frame.land.xy) && all(rel.xy <= frame.land.zw));
     let direct = sunlight(frame.eye.z + rel.z) * (sun * (1.0 - fresnel(sun)) * direct_share);
     let diffuse = irradiance_open(vec3f(0.0, 0.0, 1.0)) * 0.93;
-    let down = select(water.down, 0.8, water.lake >= 0.0);
+    let down = select(water.down, 0.8, water.lake.depth >= 0.0 && !water.lake.is_sounded);
     let up = from_below(water.depth, max(sun_within.z, 0.5), down, direct + diffuse, bed);
     var mirrored = sky_over_land(water.mirrored);
     if water.reach > 0.0 {
@@ -376,6 +417,6 @@ fn water_seen(water: Water, direction: vec3f, rel: vec3f, bed: vec3f, mirrored_l
         light = mix(light, FOAM / PI * (irradiance_open(normal) + sunny), white);
     }
     light += mirrored * (water.share * (0.5 + 0.5 * film) * (1.0 - white));
-    let open = select(step_between(0.15, 0.85, beyond(rel.xy).wet), known_at(rel.xy), water.lake >= 0.0);
+    let open = select(step_between(0.15, 0.85, beyond(rel.xy).wet), known_at(rel.xy), water.lake.depth >= 0.0);
     return mix(frame.mist.rgb, light, open);
 }

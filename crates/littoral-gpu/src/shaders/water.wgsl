@@ -1,6 +1,7 @@
 // Light on and in water: the engine's `picture::sea`, and what of `picture::shade` belongs to it.
 
-// Red: 1 where ground below the water's level is wet, at least a half where waves may get to ground above it; green: distance to the shore of a lake in samples, over 255, 0 where there is none.
+// Red: 1 where ground below the water's level is wet, at least a half where waves may get to ground above it; green, over 255: 0 where there is no lake, up to
+// FARTHEST the distance to the shore of one whose bed is unknown, in samples, above that the number of one that was filled.
 @group(1) @binding(10) var basin_map: texture_2d<f32>;
 // Beyond the land: depth (m) and share of water, by place along the border and distance from it.
 @group(1) @binding(11) var rim_map: texture_2d<f32>;
@@ -43,11 +44,23 @@ fn run_up_at(rel: vec2f) -> f32 {
     return mix(south, north, f.y);
 }
 
-// Distance (m) to the shore of the lake at a place, negative where there is none. Its edge is the contour of the ground a few centimetres above its level.
-fn lake_at(rel: vec2f) -> f32 {
+const FARTHEST = 223.0;
+
+struct Lake {
+    // Depth (m), negative where there is no lake, and level (m).
+    depth: f32,
+    level: f32,
+    // Whether its bed is known.
+    is_sounded: bool,
+}
+
+const NO_LAKE = Lake(-1.0, 0.0, false);
+
+// The lake at a place. Its edge is the contour of its bed; where that is unknown, of the ground a few centimetres above its level.
+fn lake_at(rel: vec2f) -> Lake {
     let p = frame.basin.xy + rel * frame.basin.zw;
     if frame.basin_size.z == 0.0 || any(p < vec2f(0.0)) || any(p > frame.basin_size.xy - 1.0) {
-        return -1.0;
+        return NO_LAKE;
     }
     let ij = min(vec2i(p), vec2i(frame.basin_size.xy) - 2);
     let f = p - vec2f(ij);
@@ -55,8 +68,16 @@ fn lake_at(rel: vec2f) -> f32 {
     let b = textureLoad(basin_map, ij + vec2i(1, 0), 0).y;
     let c = textureLoad(basin_map, ij + vec2i(0, 1), 0).y;
     let d = textureLoad(basin_map, ij + 1, 0).y;
-    if a + b + c + d == 0.0 {
-        return -1.0;
+    let most = max(max(a, b), max(c, d));
+    if most == 0.0 {
+        return NO_LAKE;
+    }
+    let ground = mean_of(sample_of(rel), 0u);
+    let number = round(most * 255.0) - FARTHEST;
+    if number > 0.0 {
+        let i = u32(number) - 1u;
+        let level = frame.lake_levels[i / 4u][i % 4u];
+        return Lake(level - ground, level, true);
     }
     var wet = vec2f(1.0, 1.0);
     if a > 0.0 {
@@ -67,10 +88,11 @@ fn lake_at(rel: vec2f) -> f32 {
         wet = vec2f(0.0, 1.0);
     }
     let level = mean_of(sample_of(rel + (wet - f) / frame.basin.zw), 0u);
-    if mean_of(sample_of(rel), 0u) > level + 0.05 {
-        return -1.0;
+    if ground > level + 0.05 {
+        return NO_LAKE;
     }
-    return mix(mix(a, b, f.x), mix(c, d, f.x), f.y) * 255.0 / max(frame.basin.z, frame.basin.w);
+    let to_shore = mix(mix(a, b, f.x), mix(c, d, f.x), f.y) * 255.0 / max(frame.basin.z, frame.basin.w);
+    return Lake(min(0.07 * to_shore, 30.0), level, false);
 }
 
 // Depth (m) and share of water beyond the border, by how far away that is.

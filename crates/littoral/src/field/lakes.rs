@@ -3,22 +3,30 @@
 //! A measured height field holds the surface of a lake and not its bed, and the makers of elevation models flatten it: thousands of samples have
 //! the very same height, and all about them the ground is higher, but for an outlet. Such a level hollow is taken for a lake. Level ground on
 //! which water would not stay, a plateau or a step of a coarsely rounded plain, has lower ground beside it and is none.
+//!
+//! Where the bed of a lake is known, or a reservoir is only planned, somebody names a place in it and its level, and it is filled: see [`Lakes::fill`].
+
+mod filled;
+
+pub use filled::{Filled, LakeError, Outlet};
 
 use super::{Land, Water};
 use glam::DVec2;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The lakes of some land.
+/// The lakes of some land: those that are level hollows in it, and those that were filled over a bed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lakes {
     columns: usize,
     rows: usize,
     origin: DVec2,
     spacing: DVec2,
-    /// One a sample, row by row from the south: 0 where there is none, else the distance to the shore in samples, at most 255.
-    shore: Vec<u8>,
-    levels: Vec<f32>,
+    /// One a sample, row by row from the south: see [`Lakes::samples`].
+    samples: Vec<u8>,
+    /// A sample and the level of each that is a level hollow.
+    hollows: Vec<(usize, f32)>,
+    filled: Vec<Filled>,
 }
 
 /// Water within a lake.
@@ -26,8 +34,10 @@ pub struct Lakes {
 pub struct InLake {
     /// Height of its surface (m).
     pub level: f64,
-    /// Distance to the shore (m), about.
-    pub to_shore: f32,
+    /// Its depth (m). Of a lake whose bed is unknown, a guess: it falls off from the shore.
+    pub depth: f32,
+    /// Whether its bed is known: it is the land.
+    pub is_sounded: bool,
 }
 
 /// A lake has at least this many samples: fewer are level by chance.
@@ -36,6 +46,9 @@ const LEAST: usize = 200;
 const NARROWEST: usize = 3;
 /// The part of a lake's rim that may be lower: its outlet.
 const OUTLET: f64 = 0.01;
+/// An unknown bed falls so much a metre from the shore, and no deeper than this (m).
+const FALL: f32 = 0.07;
+const DEEPEST: f32 = 30.0;
 
 /// A level hollow while it is being found.
 #[derive(Clone, Copy, Default)]
@@ -47,6 +60,19 @@ struct Hollow {
 }
 
 impl Lakes {
+    /// At most so many lakes can be filled.
+    pub const MOST_FILLED: usize = 32;
+    /// The greatest distance to a shore that is told (samples).
+    pub const FARTHEST: u8 = u8::MAX - Lakes::MOST_FILLED as u8;
+
+    /// No lakes yet.
+    pub fn none(land: &Land) -> Lakes {
+        let raster = land.raster();
+        let (columns, rows, spacing) = (raster.columns(), raster.rows(), raster.spacing());
+        let samples = vec![0; columns * rows];
+        Lakes { columns, rows, origin: land.origin(), spacing, samples, hollows: Vec::new(), filled: Vec::new() }
+    }
+
     /// The lakes of `land` that are not part of `sea`; `None` if there are none.
     pub fn find(land: &Land, sea: Option<&Water>) -> Option<Lakes> {
         let raster = land.raster();
@@ -112,49 +138,56 @@ impl Lakes {
                 }
             }
         }
-        let mut levels: Vec<f32> = Vec::new();
+        let mut lakes = Lakes::none(land);
         for hollow in &mut hollows {
             let round = (hollow.samples as f64).sqrt();
             hollow.kept = hollow.samples >= LEAST
                 && hollow.rim as f64 >= 2.0 * round
                 && hollow.lower as f64 <= OUTLET * hollow.rim as f64 + 1.0;
         }
-        let mut shore = vec![0u8; columns * rows];
         for (row, runs) in runs.iter().enumerate() {
             for (k, run) in runs.iter().enumerate() {
                 let root = trees.root(first[row] + k);
                 if hollows[root].kept {
-                    shore[row * columns..][run.clone()].fill(u8::MAX);
+                    lakes.samples[row * columns..][run.clone()].fill(Lakes::FARTHEST);
                     if root == first[row] + k {
-                        levels.push(heights[row * columns + run.start]);
+                        let sample = row * columns + run.start;
+                        lakes.hollows.push((sample, heights[sample]));
                     }
                 }
             }
         }
-        if levels.is_empty() {
+        if lakes.hollows.is_empty() {
             return None;
         }
-        distances(&mut shore, columns, rows);
-        Some(Lakes { columns, rows, origin: land.origin(), spacing: raster.spacing(), shore, levels })
+        distances(&mut lakes.samples, columns, rows);
+        Some(lakes)
     }
 
-    /// Heights of their surfaces (m), from south to north.
-    pub fn levels(&self) -> &[f32] {
-        &self.levels
+    /// Heights of their surfaces (m): from south to north, then those that were filled.
+    pub fn levels(&self) -> impl Iterator<Item = f64> {
+        let hollows = self.hollows.iter().map(|(_, level)| f64::from(*level));
+        hollows.chain(self.filled.iter().map(|lake| lake.level))
     }
 
-    /// For each sample of the land, counted row by row from the south: 0 where there is no lake, else the distance to its shore in samples, at most 255.
-    pub fn shores(&self) -> &[u8] {
-        &self.shore
+    /// Those that were filled, in that order.
+    pub fn filled(&self) -> &[Filled] {
+        &self.filled
+    }
+
+    /// For each sample of the land, counted row by row from the south: 0 where there is no lake; up to [`Lakes::FARTHEST`] the distance to the shore of a level
+    /// hollow, in samples; above, in a filled lake, that much more than its number, counted from 1.
+    pub fn samples(&self) -> &[u8] {
+        &self.samples
     }
 
     /// Share of the land's samples that they cover, in [0, 1].
     pub fn share(&self) -> f64 {
-        self.shore.iter().filter(|d| **d > 0).count() as f64 / self.shore.len() as f64
+        self.samples.iter().filter(|d| **d > 0).count() as f64 / self.samples.len() as f64
     }
 
-    /// The lake at a world position (m) of `land`, which is the one they were found in. Its edge is the exact contour of the ground a few
-    /// centimetres above its level.
+    /// The lake at a world position (m) of `land`, which is the one they were found in. The edge of a filled one is the exact contour of the bed; that of a level
+    /// hollow the contour of the ground a few centimetres above its level.
     pub fn at(&self, land: &Land, at: DVec2) -> Option<InLake> {
         let p = (at - self.origin) / self.spacing;
         let last = DVec2::new((self.columns - 1) as f64, (self.rows - 1) as f64);
@@ -164,19 +197,25 @@ impl Lakes {
         let (c, r) = ((p.x as usize).min(self.columns - 2), (p.y as usize).min(self.rows - 2));
         let corner = r * self.columns + c;
         let corners = [corner, corner + 1, corner + self.columns, corner + self.columns + 1];
-        let wet = corners.into_iter().find(|&i| self.shore[i] > 0)?;
-        let level = f64::from(land.raster().heights()[wet]);
+        let wet = corners.into_iter().max_by_key(|&i| self.samples[i]).filter(|&i| self.samples[i] > 0)?;
         let height = f64::from(land.height_at(at)?);
+        if let Some(number) = self.samples[wet].checked_sub(Lakes::FARTHEST + 1) {
+            let level = self.filled[usize::from(number)].level;
+            let depth = (level - height) as f32;
+            return (height <= level).then_some(InLake { level, depth, is_sounded: true });
+        }
+        let level = f64::from(land.raster().heights()[wet]);
         let f = p - DVec2::new(c as f64, r as f64);
-        let distance = |i: usize| f64::from(self.shore[corners[i]]);
+        let distance = |i: usize| f64::from(self.samples[corners[i]]);
         let low = distance(0) + (distance(1) - distance(0)) * f.x;
         let high = distance(2) + (distance(3) - distance(2)) * f.x;
-        let samples = low + (high - low) * f.y;
-        (height <= level + EDGE).then(|| InLake { level, to_shore: (samples * self.spacing.min_element()) as f32 })
+        let to_shore = (low + (high - low) * f.y) * self.spacing.min_element();
+        let depth = (FALL * to_shore as f32).min(DEEPEST);
+        (height <= level + EDGE).then_some(InLake { level, depth, is_sounded: false })
     }
 }
 
-/// How far above a lake's level its shore is drawn (m).
+/// How far above a level hollow its shore is drawn (m).
 const EDGE: f64 = 0.05;
 
 /// Distances to the nearest 0, counted in samples, by two sweeps (G. Borgefors, "Distance transformations in digital images", 1986). What lies beyond
@@ -233,11 +272,11 @@ mod tests {
     fn a_flattened_hollow_is_a_lake() {
         let land = hills(101, 0);
         let lakes = Lakes::find(&land, None).expect("a lake");
-        assert_eq!(lakes.levels(), [310.0]);
+        assert!(lakes.levels().eq([310.0]));
         let flat = land.raster().heights().iter().filter(|h| **h == 310.0).count();
         assert!((lakes.share() * 101.0 * 101.0 - flat as f64).abs() < 0.02 * flat as f64, "all of it but slivers");
         let middle = lakes.at(&land, DVec2::ZERO).expect("in the middle");
-        assert!(middle.level == 310.0 && middle.to_shore > 60.0, "{middle:?}");
+        assert!(middle.level == 310.0 && middle.depth > 0.07 * 60.0 && !middle.is_sounded, "{middle:?}");
         assert_eq!(lakes.at(&land, DVec2::new(480.0, 480.0)), None);
         assert_eq!(lakes.at(&land, DVec2::new(9e9, f64::NAN)), None);
         // Its edge is a contour, not the samples' stairs.

@@ -111,6 +111,33 @@ impl Land {
         Some([at(0, 0)?, at(1, 0)?, at(0, 1)?, at(1, 1)?])
     }
 
+    /// Which samples are void in one piece with the raster's edge; empty if none.
+    pub(crate) fn voids_from_the_edge(&self) -> Vec<bool> {
+        let raster = &self.raster;
+        let (columns, rows, voids) = (raster.columns(), raster.rows(), raster.voids());
+        let mut away = vec![false; columns * rows];
+        let ends = (0..columns).flat_map(|c| [c, (rows - 1) * columns + c]);
+        let sides = (0..rows).flat_map(|r| [r * columns, (r + 1) * columns - 1]);
+        let mut queue: Vec<usize> = ends.chain(sides).filter(|&i| voids.is_void(i)).collect();
+        if queue.is_empty() {
+            return Vec::new();
+        }
+        queue.iter().for_each(|&i| away[i] = true);
+        while let Some(i) = queue.pop() {
+            let (column, row) = (i % columns, i / columns);
+            for r in row.saturating_sub(1)..(row + 2).min(rows) {
+                for c in column.saturating_sub(1)..(column + 2).min(columns) {
+                    let j = r * columns + c;
+                    if voids.is_void(j) && !away[j] {
+                        away[j] = true;
+                        queue.push(j);
+                    }
+                }
+            }
+        }
+        away
+    }
+
     /// Exact height (m) of the surface below a world position (m); `None` where void or outside.
     pub fn height_at(&self, xy: DVec2) -> Option<f32> {
         self.patch(xy).map(interpolate)

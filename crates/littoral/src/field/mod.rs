@@ -17,7 +17,7 @@ mod windows;
 
 pub(crate) use blocks::{BLOCK_LEVELS, Block};
 pub use deviation::ErrorPyramid;
-pub use lakes::{InLake, Lakes};
+pub use lakes::{Filled, InLake, LakeError, Lakes, Outlet};
 pub use land::Land;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};

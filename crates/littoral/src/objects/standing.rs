@@ -1,7 +1,7 @@
 //! Where an object stands.
 
 use super::Object;
-use crate::field::{Land, Sea, Water};
+use crate::field::{Lakes, Land, Sea, Water};
 use crate::space::View;
 use glam::{DVec2, DVec3, Mat3, Quat, Vec2, Vec3};
 use std::sync::Arc;
@@ -46,9 +46,11 @@ impl Standing {
         Standing { object: object.clone(), place, heading: 0.0, scale: 1.0, footing: Footing::Surface }
     }
 
-    /// How it lies: on the ground of the full data, or afloat on still water, or on that of a sea at its instant. `None` where there is nothing to stand on.
-    pub fn pose(&self, land: &Land, water: Option<&Water>, sea: Option<&Sea>) -> Option<Pose> {
-        let afloat = water.filter(|water| self.footing == Footing::Surface && water.covers(self.place));
+    /// How it lies: on the ground of the full data, or afloat on a lake, on still water, or on that of a sea at its instant. `None` where there is nothing to stand on.
+    pub fn pose(&self, land: &Land, water: Option<&Water>, lakes: Option<&Lakes>, sea: Option<&Sea>) -> Option<Pose> {
+        let floats = self.footing == Footing::Surface;
+        let afloat = water.filter(|water| floats && water.covers(self.place));
+        let lake = || lakes.filter(|_| floats)?.at(land, self.place);
         let (height, slope) = match (afloat, sea) {
             (Some(_), Some(sea)) => {
                 // Waves narrower than it is do not lift it.
@@ -58,7 +60,10 @@ impl Standing {
                 (surface.height, surface.slope)
             }
             (Some(water), None) => (water.level, Vec2::ZERO),
-            (None, _) => (f64::from(land.height_at(self.place)?), Vec2::ZERO),
+            (None, _) => {
+                let height = lake().map_or_else(|| land.height_at(self.place).map(f64::from), |lake| Some(lake.level));
+                (height?, Vec2::ZERO)
+            }
         };
         let leaning = Quat::from_rotation_arc(Vec3::Z, Vec3::new(-slope.x, -slope.y, 1.0).normalize());
         let turned = Quat::from_rotation_z(-self.heading as f32);

@@ -73,7 +73,7 @@ impl<'a> Ground<'a> {
             let (inner_columns, inner_rows) = (land.raster().columns(), land.raster().rows());
             let margin = if cut { 0 } else { (inner_columns.min(inner_rows) / 14).clamp(3, 160) };
             if cut {
-                cut_away = voids_from_the_edge(&land);
+                cut_away = land.voids_from_the_edge();
             }
             let (land, known) = with_mist(&land, level, mist, margin, &cut_away);
             let land = match block.filter(|_| !cut_away.is_empty()) {
@@ -404,33 +404,6 @@ fn with_sunk_bed(land: &Land, water: &Water) -> Option<Land> {
     }
     let sunk = Raster::new(columns, rows, raster.spacing(), heights).ok()?;
     Some(Land::at(sunk, land.origin()))
-}
-
-/// Which samples are void in one piece with the raster's edge; empty if none.
-fn voids_from_the_edge(land: &Land) -> Vec<bool> {
-    let raster = land.raster();
-    let (columns, rows, voids) = (raster.columns(), raster.rows(), raster.voids());
-    let mut away = vec![false; columns * rows];
-    let ends = (0..columns).flat_map(|c| [c, (rows - 1) * columns + c]);
-    let sides = (0..rows).flat_map(|r| [r * columns, (r + 1) * columns - 1]);
-    let mut queue: Vec<usize> = ends.chain(sides).filter(|&i| voids.is_void(i)).collect();
-    if queue.is_empty() {
-        return Vec::new();
-    }
-    queue.iter().for_each(|&i| away[i] = true);
-    while let Some(i) = queue.pop() {
-        let (column, row) = (i % columns, i / columns);
-        for r in row.saturating_sub(1)..(row + 2).min(rows) {
-            for c in column.saturating_sub(1)..(column + 2).min(columns) {
-                let j = r * columns + c;
-                if voids.is_void(j) && !away[j] {
-                    away[j] = true;
-                    queue.push(j);
-                }
-            }
-        }
-    }
-    away
 }
 
 /// The land with some samples lowered to one height (m).

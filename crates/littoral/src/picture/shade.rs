@@ -323,7 +323,9 @@ impl Stage<'_> {
                 None => even(Vec3::splat(0.25)),
             };
         }
-        let water = self.scene.water.filter(|w| w.covers(at) || position.z < w.level + 15.0);
+        // Dry ground below the sea's level is not by the sea.
+        let shore = |level: f64| (level..level + 15.0).contains(&position.z);
+        let water = self.scene.water.filter(|w| w.covers(at) || shore(w.level));
         let level = water.map(|w| w.level as f32);
         let broad = self.ground.surface(at, (4.0 * spacing).max(footprint));
         let beach = level.filter(|level| (-1.0..Beach::HIGHEST as f32).contains(&(position.z as f32 - level)));
@@ -409,18 +411,23 @@ impl Stage<'_> {
         let ripples = wet.map_or_else(|| ripples(at, footprint), Wet::ripples);
         let raised = wet.map_or(0.0, |_| (position.z + self.drop_at(at) - self.level()) as f32);
         let shown = normal_of_slope(ripples.slope);
-        if let Some(lake) = self.scene.lakes.filter(|_| wet.is_none()).and_then(|l| l.at(self.scene.land, at)) {
+        let lake = self.scene.lakes.filter(|_| wet.is_none()).and_then(|lakes| lakes.at(self.scene.land, at));
+        if let Some(lake) = lake.filter(|lake| !lake.is_sounded) {
             return Pool { open: self.ground.known(at), ..self.lake(ripples, &lake) };
         }
+        let depth_at = |at: DVec2| match &lake {
+            Some(lake) => self.ground.land.height_at(at).map_or(lake.depth, |bed| lake.level as f32 - bed),
+            None => self.depth(at),
+        };
         // Into the water, to where the bent ray meets the bed.
         let within = if shown.dot(eye) > 0.02 { refract(direction, shown) } else { refract(direction, Vec3::Z) };
         let down = (-within.z).max(0.3);
         let aside = within.truncate() / down;
         let mut below = at;
-        let mut depth = (self.depth(at) + raised).max(0.0);
+        let mut depth = (depth_at(at) + raised).max(0.0);
         for _ in 0..3 {
             below = at + aside.as_dvec2() * f64::from(depth.min(60.0));
-            depth = 0.5 * (depth + (self.depth(below) + raised).max(0.0));
+            depth = 0.5 * (depth + (depth_at(below) + raised).max(0.0));
         }
         let sun_within = -refract(-self.sun, Vec3::Z);
         let bed = if depth < 45.0 {
@@ -429,10 +436,17 @@ impl Stage<'_> {
             let inside = below.clamp(low, high);
             let away = below.distance(inside) as f32;
             let surface = self.ground.surface(inside, footprint.max(0.6 * away));
-            let material = self.material(lens, below.extend(self.level() - f64::from(depth)), &surface, footprint);
-            let facing = (material.normal.dot(sun_within) / sun_within.z.max(0.2)).clamp(0.3, 1.5);
+            let (albedo, normal) = match lake {
+                Some(_) => (MUD, normal_of_slope(surface.slope)),
+                None => {
+                    let position = below.extend(self.level() - f64::from(depth));
+                    let material = self.material(lens, position, &surface, footprint);
+                    (material.albedo, material.normal)
+                }
+            };
+            let facing = (normal.dot(sun_within) / sun_within.z.max(0.2)).clamp(0.3, 1.5);
             let known = if away > 0.0 { 1.0 } else { self.ground.known(below) };
-            Vec3::splat(0.1).lerp(material.albedo * facing, known)
+            Vec3::splat(0.1).lerp(albedo * facing, known)
         } else {
             Vec3::splat(0.1)
         };
@@ -441,16 +455,15 @@ impl Stage<'_> {
         Pool {
             ripples,
             depth,
-            open: self.open_sea(at),
+            open: if lake.is_some() { self.ground.known(at) } else { self.open_sea(at) },
             skylit: up(irradiance(&self.skylight.open, Vec3::Z) * 0.93),
-            sunlit: up(self.air.sunlight(0.0) * (sun * (1.0 - fresnel(sun)))),
+            sunlit: up(self.air.sunlight(lake.map_or(0.0, |lake| lake.level as f32)) * (sun * (1.0 - fresnel(sun)))),
         }
     }
 
     /// The water of a lake, of which only the surface is known: a bed of mud that falls off from the shore.
     fn lake(&self, ripples: Ripples, lake: &InLake) -> Pool {
-        const MUD: Vec3 = Vec3::new(0.09, 0.08, 0.055);
-        let depth = (0.07 * lake.to_shore).min(30.0);
+        let depth = lake.depth;
         let down = (-refract(-self.sun, Vec3::Z)).z.max(0.5);
         let up = |irradiance: Vec3| self.depths.radiance(depth, down, 0.8, irradiance, MUD);
         let sun = self.sun.z.max(0.0);
@@ -500,6 +513,9 @@ impl Stage<'_> {
         light * veil.through + veil.light
     }
 }
+
+/// Reflectance of the beds of lakes.
+const MUD: Vec3 = Vec3::new(0.09, 0.08, 0.055);
 
 fn normal_of_slope(slope: Vec2) -> Vec3 {
     Vec3::new(-slope.x, -slope.y, 1.0).normalize()

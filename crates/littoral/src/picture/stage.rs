@@ -278,11 +278,7 @@ impl<'a> Stage<'a> {
                 }
                 return Ahead::Wall(Wall { position, normal: self.ground.outward(at), ground: position.z });
             }
-            // The ground of a lake, as it was measured, is its surface.
-            return match self.scene.lakes.filter(|_| !self.is_map()).and_then(|lakes| lakes.at(self.scene.land, at)) {
-                Some(lake) => Ahead::Water { position: at.extend(lake.level), wet: None },
-                None => Ahead::Ground { position },
-            };
+            return self.lake_over(eye, direction, ground).unwrap_or(Ahead::Ground { position });
         }
         if let Some(block) = &self.ground.block {
             return block.floor(eye, direction).map_or(Ahead::Sky, |position| Ahead::Floor { position });
@@ -291,6 +287,33 @@ impl<'a> Stage<'a> {
         match curved(rise, direction) {
             Some(t) if rise > 0.0 => Ahead::Mist { position: eye + direction * t },
             _ => Ahead::Sky,
+        }
+    }
+
+    /// The lake that a ray from the eye meets before the ground at some distance (m).
+    fn lake_over(&self, eye: DVec3, direction: DVec3, ground: f64) -> Option<Ahead> {
+        let (lakes, land) = (self.scene.lakes.filter(|_| !self.is_map())?, self.scene.land);
+        let at = (eye + direction * ground).truncate();
+        let lake = lakes.at(land, at)?;
+        if !lake.is_sounded {
+            // Its ground, as it was measured, is its surface.
+            return Some(Ahead::Water { position: at.extend(lake.level), wet: None });
+        }
+        let rise = eye.z - lake.level;
+        if rise <= 0.0 {
+            return None;
+        }
+        // From where it comes down to the level to its bed a ray stays within the lake.
+        let distance = -rise / direction.z;
+        if !(distance > 0.0 && distance <= ground * (1.0 + 1e-6)) {
+            // A mesh may lie above water.
+            return Some(Ahead::Water { position: at.extend(lake.level), wet: None });
+        }
+        let position = eye + direction * distance;
+        match lakes.at(land, position.truncate()) {
+            Some(lake) => Some(Ahead::Water { position: position.truncate().extend(lake.level), wet: None }),
+            // A mesh that cuts off the shore, or the side of a void.
+            None => land.height_at(position.truncate()).map(|_| Ahead::Ground { position }),
         }
     }
 }

@@ -8,7 +8,9 @@ use super::display::Medium;
 use super::horizon::horizon;
 use super::stage::{HIGHEST_EYE, Stage};
 use super::texture::Drape;
+use crate::field::Lakes;
 use glam::{DVec2, Vec2, Vec3};
+use std::borrow::Cow;
 
 /// Values at the points of a lattice, row by row from the south-western one.
 #[derive(Clone, Debug, Default)]
@@ -89,8 +91,10 @@ pub struct Tables<'a> {
     /// Where ground below the level of the water (m) is wet: at points whose value is [`Tables::BASIN`]. Ground above it may be wetted by waves where the value is that or
     /// [`Tables::BEACH`].
     pub water: Option<(f64, Lattice<u8>)>,
-    /// At the same points as the water, distance to the shore of the lake there, in samples: 0 where there is none; empty where there are no lakes.
+    /// At the same points as the water, the lake there: see [`Lakes::samples`](crate::field::Lakes::samples); empty where there are no lakes.
     pub lakes: Lattice<u8>,
+    /// Levels (m) of those lakes that were filled over a known bed.
+    pub lake_levels: Vec<f32>,
     /// Whether that water goes on to the horizon.
     pub endless: bool,
     /// Beyond the land, depth (m) and share of water: for places along the border, counter-clockwise from its south-western corner (columns, evenly), and
@@ -181,7 +185,7 @@ impl Stage<'_> {
             })
             .collect();
         let toward = self.sun.truncate().normalize_or(Vec2::X);
-        let horizon = horizon(&heights[0].values, heights[0].columns, heights[0].rows, spacing, toward);
+        let horizon = horizon(&self.with_lakes(&heights[0]), heights[0].columns, heights[0].rows, spacing, toward);
         let land = (scene.land.origin(), scene.land.origin() + scene.land.extent());
         let side = scene.land.extent().max_element();
         let rim = self.rim.as_ref().map_or(Lattice::default(), |rim| {
@@ -218,7 +222,8 @@ impl Stage<'_> {
                 };
                 (water.level, on_land(&water.basin().iter().enumerate().map(point).collect::<Vec<u8>>()))
             }),
-            lakes: scene.lakes.map_or(Lattice::default(), |lakes| on_land(lakes.shores())),
+            lakes: scene.lakes.map_or(Lattice::default(), |lakes| on_land(lakes.samples())),
+            lake_levels: scene.lakes.map_or(Vec::new(), |l| l.filled().iter().map(|lake| lake.level as f32).collect()),
             endless: scene.water.is_some_and(|water| water.reaches_horizon()),
             rim,
             land,
@@ -238,6 +243,28 @@ impl Stage<'_> {
             land_sky: self.sky_table(f64::from(self.middle)).light,
             heights,
         }
+    }
+
+    /// Heights (m) at the points of the finest level, those of lakes in place of their beds: the sun reaches the surface.
+    fn with_lakes<'b>(&self, finest: &'b Lattice<f32>) -> Cow<'b, [f32]> {
+        let Some(lakes) = self.scene.lakes.filter(|lakes| !lakes.filled().is_empty()) else {
+            return Cow::Borrowed(&finest.values);
+        };
+        let land = self.scene.land;
+        // The ground of a picture may be wider than the land, by whole samples.
+        let margin = ((land.origin() - finest.origin) / finest.spacing).round();
+        let first = margin.y as usize * finest.columns + margin.x as usize;
+        let columns = land.raster().columns();
+        let mut heights = finest.values.clone();
+        for (row, samples) in lakes.samples().chunks_exact(columns).enumerate() {
+            let heights = &mut heights[first + row * finest.columns..][..columns];
+            for (height, number) in heights.iter_mut().zip(samples) {
+                if let Some(number) = number.checked_sub(Lakes::FARTHEST + 1) {
+                    *height = lakes.filled()[usize::from(number)].level as f32;
+                }
+            }
+        }
+        Cow::Owned(heights)
     }
 
     /// The sky from a height (m).

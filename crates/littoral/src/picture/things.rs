@@ -95,7 +95,7 @@ impl Stage<'_> {
         let sea = sea.filter(|_| self.shows_waves());
         let objects = self.scene.objects.iter().filter(|_| self.scene.shows_objects());
         objects.filter_map(move |standing| {
-            let pose = standing.pose(self.scene.land, self.scene.water, sea)?;
+            let pose = standing.pose(self.scene.land, self.scene.water, self.scene.lakes, sea)?;
             Some((standing.object.clone(), pose))
         })
     }
