@@ -43,7 +43,7 @@ use std::time::Instant;
   littoral render dem.tif --lod quadtree --tolerance 2 --wireframe      the mesh that a method of detail draws
   littoral render --object lighthouse@3690,1000            with a lighthouse on the headland
   littoral render dem.tif --object boat.glb@562900,5109300,135    with a boat of your own that heads south-east
-  littoral render dem.tif --lake 562300,5107000=620       a reservoir: water up to 620 m over the ground at that place
+  littoral render dem.tif --lake 562590,5116290=1900      a lake or a reservoir: water up to 1900 m over the ground at that place
   littoral render --gpu                                    drawn by the graphics card, the same exact surface
   littoral render dem.tif --path                           a film: once round the land
   littoral render dem.tif --path --save-path round.toml    the path, to be edited, and the film

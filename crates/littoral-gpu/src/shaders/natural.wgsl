@@ -48,7 +48,8 @@ fn natural(site: Site, surface: Surface, broad: Surface) -> Material {
     // Relief below the samples.
     let shore_calm = step_between(0.5, 6.0, abs(above) + 12.0 * rocky);
     let amplitude = (0.060 + 0.24 * rocky - 0.07 * step_between(1.4, 2.4, steep)) * (0.25 + 0.75 * shore_calm);
-    let layers = 0.35 + 1.7 * step_between(0.9, 1.8, steep);
+    let layered = step_between(0.9, 1.8, steep);
+    let both = length(vec2f(layered, 1.0 - layered));
     var relief = vec3f(0.0);
     var bumps = 0.0;
     var shown = 0.0;
@@ -57,9 +58,15 @@ fn natural(site: Site, surface: Surface, broad: Surface) -> Material {
         if share == 0.0 {
             break;
         }
-        let n = grain(octave, rel, z * layers);
-        relief += n.gradient * vec3f(1.0, 1.0, layers) * (amplitude * share);
-        bumps += n.value * share;
+        for (var k = 0u; k < 2u; k++) {
+            let part = select(1.0 - layered, layered, k == 1u) / both;
+            if part > 0.0 {
+                let upward = select(0.35, 2.05, k == 1u);
+                let n = grain(octave, rel, z * upward);
+                relief += n.gradient * vec3f(1.0, 1.0, upward) * (amplitude * share * part);
+                bumps += n.value * share * part;
+            }
+        }
         shown += 1.0;
     }
     let roughened = normalize(normal - (relief - normal * dot(relief, normal)));

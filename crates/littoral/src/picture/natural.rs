@@ -72,16 +72,23 @@ pub fn natural(site: &Site, surface: &Surface, broad: &Surface, climate: &Climat
     let amplitude = (0.060 + 0.24 * rocky - 0.07 * step(1.4, 2.4, steep)) * (0.25 + 0.75 * shore_calm);
     let mut wavelength = 2.3 * spacing;
     let (mut relief, mut bumps, mut shown) = (Vec3::ZERO, 0.0f32, 0.0f32);
+    // Cliffs are layered, finer upward than along; on gentler ground layers would show as contour lines. Between them both are there, as rough together as either: one whose
+    // layers grew finer with the slope would, high above 0, draw contours of the slope.
+    let layered = step(0.9, 1.8, steep);
+    let both = layered.hypot(1.0 - layered);
     for octave in 0..11u32 {
         let share = resolved(wavelength, footprint);
         if share == 0.0 {
             break;
         }
-        // Cliffs are layered, finer upward than along; on gentler ground layers would show as contour lines.
-        let layers = DVec3::new(1.0, 1.0, 0.35 + 1.7 * f64::from(step(0.9, 1.8, steep)));
-        let noise = grain(at * layers / f64::from(wavelength), 100 + octave);
-        relief += noise.gradient * layers.as_vec3() * (amplitude * share);
-        bumps += noise.value * share;
+        for (upward, part) in [(0.35, 1.0 - layered), (2.05, layered)] {
+            if part > 0.0 {
+                let (layers, share) = (DVec3::new(1.0, 1.0, upward), share * part / both);
+                let noise = grain(at * layers / f64::from(wavelength), 100 + octave);
+                relief += noise.gradient * layers.as_vec3() * (amplitude * share);
+                bumps += noise.value * share;
+            }
+        }
         shown += 1.0;
         wavelength *= 0.47;
     }
