@@ -164,6 +164,35 @@ fn far_heights_wait_and_the_work_is_spread() {
     assert_eq!(flight.heights_asked(), 0, "nothing moved");
 }
 
+/// No height of what is drawn is later than its share of the tolerance, over a wave whose rise speed is reached everywhere.
+#[test]
+fn no_height_is_later_than_its_share() {
+    let datum = Datum::Plane { origin: DVec2::new(1e4, -3e4), size: DVec2::splat(2000.0) };
+    let sine = Sine { amplitude: 1.0, length: Length::Wavelength(60.0), heading: 0.7, phase: 0.0, steepness: 0.0 };
+    let mut sea = Sea::new(datum, 3.0).with(Box::new(Sines::new(&[sine], StillWater::DEEP).expect("a wave")));
+    let mut flight = RoamSea::new(Limits { finest: 12, triangles: 20_000 }).with_lateness(0.5);
+    let view = low_over_the_sea(0.0);
+    let forward = DVec3::new(300.0, 300.0, -60.0).normalize();
+    let focal = 180.0 / 0.5f64.tan();
+    let mut latest = 0.0f64;
+    for frame in 0..90 {
+        sea.set_time(f64::from(frame) / 60.0);
+        flight.update(&sea, &view, &mut || false).expect("a view");
+        let mesh = flight.mesh();
+        for vertex in mesh.triangles.iter().flatten().map(|&i| &mesh.vertices[i as usize]) {
+            let at = vertex.world(&datum);
+            let away = at - view.eye;
+            let depth = away.dot(forward);
+            if depth > 1.0 {
+                let off = (at.z - sea.height_at(at.truncate())).abs();
+                latest = latest.max(off * focal * away.truncate().length() / (depth * depth));
+            }
+        }
+    }
+    let share = 0.5 * f64::from(view.tolerance_pixels);
+    assert!((0.2 * share..=share * 1.01).contains(&latest), "{latest} pixels late of {share}");
+}
+
 #[test]
 fn warm_frames_allocate_nothing() {
     let mut sea = sea_of(2);
