@@ -19,7 +19,7 @@ use std::ops::Range;
 pub enum Simd {
     /// Plain Rust.
     Portable,
-    /// Eight lanes of AVX2 (x86-64).
+    /// Eight lanes of AVX2 and FMA (x86-64).
     Avx2,
     /// Sixteen lanes of AVX-512 F, BW, DQ and VL (x86-64).
     Avx512,
@@ -33,7 +33,7 @@ impl Simd {
             #[cfg(target_arch = "x86_64")]
             Simd::Avx2 => {
                 use std::arch::is_x86_feature_detected as has;
-                has!("avx2") && has!("bmi1") && has!("bmi2") && has!("popcnt") && has!("lzcnt")
+                has!("avx2") && has!("fma") && has!("bmi1") && has!("bmi2") && has!("popcnt") && has!("lzcnt")
             }
             #[cfg(target_arch = "x86_64")]
             Simd::Avx512 => {
@@ -93,8 +93,7 @@ impl<'a> RayCaster<'a> {
             self.first_hits(std::slice::from_ref(ray), &mut distance);
             return distance[0];
         }
-        let wide = self.simd == Simd::Avx512;
-        let distance = self.single.as_ref().map_or(f32::NAN, |single| single.first_hit(wide, ray));
+        let distance = self.single.as_ref().map_or(f32::NAN, |single| single.first_hit(self.simd, ray));
         if distance.is_nan() { self.exact(ray) } else { distance }
     }
 
@@ -350,12 +349,12 @@ impl<T: Copy, const FOOTPRINT: bool> Rays for Stream<'_, T, FOOTPRINT> {
 pub(super) fn dispatch<R: Rays, const SHEET: bool, const ANY: bool>(simd: Simd, scene: &Scene, rays: &mut R) {
     #[cfg(target_arch = "x86_64")]
     {
-        #[target_feature(enable = "avx512f,avx512dq,avx2,bmi1,bmi2,popcnt,lzcnt")]
+        #[target_feature(enable = "avx512f,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
         fn avx512<R: Rays, const SHEET: bool, const ANY: bool>(scene: &Scene, rays: &mut R) {
             // SAFETY: this function is compiled for it and only called where it is available.
             stream::run::<_, R, SHEET, ANY>(unsafe { Avx512::new() }, scene, rays);
         }
-        #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
         fn avx2<R: Rays, const SHEET: bool, const ANY: bool>(scene: &Scene, rays: &mut R) {
             // SAFETY: as above.
             stream::run::<_, R, SHEET, ANY>(unsafe { Avx2::new() }, scene, rays);

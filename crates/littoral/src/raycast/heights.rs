@@ -64,12 +64,12 @@ fn lookup<P: Copy>(simd: Simd, land: &Land, places: &[P], heights: &mut [f32], l
     }
     #[cfg(target_arch = "x86_64")]
     {
-        #[target_feature(enable = "avx512f,avx512dq,avx2,bmi1,bmi2,popcnt,lzcnt")]
+        #[target_feature(enable = "avx512f,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
         fn avx512<P: Copy>(land: &Land, places: &[P], heights: &mut [f32], lattice: impl Fn(P) -> DVec2) {
             // SAFETY: this function is compiled for it and only called where it is available.
             kernel(unsafe { Avx512::new() }, land, places, heights, lattice);
         }
-        #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
         fn avx2<P: Copy>(land: &Land, places: &[P], heights: &mut [f32], lattice: impl Fn(P) -> DVec2) {
             // SAFETY: as above.
             kernel(unsafe { Avx2::new() }, land, places, heights, lattice);

@@ -2,7 +2,7 @@
 //!
 //! A kernel is generic over [`Lanes`] and inlined into an entry point compiled for one set of processor features (the
 //! pattern of the `memchr` crate). A value of a `Lanes` type is the proof that its processor features are there, which
-//! makes its methods safe. No operation contracts or approximates, and comparisons treat NaN alike, so that every
+//! makes its methods safe. No operation contracts what is written apart or approximates, and comparisons treat NaN alike, so that every
 //! implementation gives the same bits.
 
 /// Arithmetic on `COUNT` lanes of `f32` and `i32`.
@@ -22,6 +22,10 @@ pub(super) trait Lanes: Copy {
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     fn sub(self, a: Self::F, b: Self::F) -> Self::F;
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    /// a · b + c, rounded once.
+    fn fused(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
+    /// c − a · b, rounded once.
+    fn fused_from(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
     fn sqrt(self, a: Self::F) -> Self::F;
     /// `b` unless `a < b`.
@@ -133,6 +137,8 @@ impl Lanes for Portable {
     #[inline(always)] fn add(self, a: Self::F, b: Self::F) -> Self::F { both(a, b, |a, b| a + b) }
     #[inline(always)] fn sub(self, a: Self::F, b: Self::F) -> Self::F { both(a, b, |a, b| a - b) }
     #[inline(always)] fn mul(self, a: Self::F, b: Self::F) -> Self::F { both(a, b, |a, b| a * b) }
+    #[inline(always)] fn fused(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F { std::array::from_fn(|i| a[i].mul_add(b[i], c[i])) }
+    #[inline(always)] fn fused_from(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F { std::array::from_fn(|i| (-a[i]).mul_add(b[i], c[i])) }
     #[inline(always)] fn div(self, a: Self::F, b: Self::F) -> Self::F { both(a, b, |a, b| a / b) }
     #[inline(always)] fn sqrt(self, a: Self::F) -> Self::F { each(a, f32::sqrt) }
     #[inline(always)] fn min(self, a: Self::F, b: Self::F) -> Self::F { both(a, b, |a, b| if a < b { a } else { b }) }
@@ -249,6 +255,8 @@ mod x86 {
         #[inline(always)] fn add(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm256_add_ps(a, b) } }
         #[inline(always)] fn sub(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm256_sub_ps(a, b) } }
         #[inline(always)] fn mul(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm256_mul_ps(a, b) } }
+        #[inline(always)] fn fused(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F { unsafe { _mm256_fmadd_ps(a, b, c) } }
+        #[inline(always)] fn fused_from(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F { unsafe { _mm256_fnmadd_ps(a, b, c) } }
         #[inline(always)] fn div(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm256_div_ps(a, b) } }
         #[inline(always)] fn sqrt(self, a: Self::F) -> Self::F { unsafe { _mm256_sqrt_ps(a) } }
         #[inline(always)] fn min(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm256_min_ps(a, b) } }
@@ -384,6 +392,8 @@ mod x86 {
         #[inline(always)] fn add(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm512_add_ps(a, b) } }
         #[inline(always)] fn sub(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm512_sub_ps(a, b) } }
         #[inline(always)] fn mul(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm512_mul_ps(a, b) } }
+        #[inline(always)] fn fused(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F { unsafe { _mm512_fmadd_ps(a, b, c) } }
+        #[inline(always)] fn fused_from(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F { unsafe { _mm512_fnmadd_ps(a, b, c) } }
         #[inline(always)] fn div(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm512_div_ps(a, b) } }
         #[inline(always)] fn sqrt(self, a: Self::F) -> Self::F { unsafe { _mm512_sqrt_ps(a) } }
         #[inline(always)] fn min(self, a: Self::F, b: Self::F) -> Self::F { unsafe { _mm512_min_ps(a, b) } }

@@ -73,12 +73,12 @@ impl RayCaster<'_> {
         };
         #[cfg(target_arch = "x86_64")]
         {
-            #[target_feature(enable = "avx512f,avx512dq,avx2,bmi1,bmi2,popcnt,lzcnt")]
+            #[target_feature(enable = "avx512f,avx512dq,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
             fn avx512(scene: &Scene, tops: &Tops, segments: &[[Vec3; 2]], visible: &mut [bool], doubt: &mut Doubt) {
                 // SAFETY: this function is compiled for it and only called where it is available.
                 looks(unsafe { Avx512::new() }, scene, tops, segments, visible, doubt);
             }
-            #[target_feature(enable = "avx2,bmi1,bmi2,popcnt,lzcnt")]
+            #[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
             fn avx2(scene: &Scene, tops: &Tops, segments: &[[Vec3; 2]], visible: &mut [bool], doubt: &mut Doubt) {
                 // SAFETY: as above.
                 looks(unsafe { Avx2::new() }, scene, tops, segments, visible, doubt);

@@ -28,6 +28,7 @@
 )]
 mod x86;
 
+use super::Simd;
 use super::scene::Scene;
 use super::stream::LocalRay;
 use crate::field::{BLOCK_LEVELS, Block, Land};
@@ -98,6 +99,8 @@ struct Octant {
     last: [f32; 2],
     /// Climb (m per lattice unit) beyond which rays are steep.
     steep: f32,
+    /// Half of all that the ground's heights differ by (m).
+    relief: f32,
     /// For the major and the minor axis: all ones where the ray runs backward.
     mirror: [i32; 2],
     /// Samples from one row to the next, and from the first of 4 × 4 patches to the row to begin with.
@@ -215,8 +218,17 @@ struct Met {
     below: bool,
 }
 
-/// The two looks, for one set of instructions; all give the same bits.
+/// The two looks and what comes before them, for one set of instructions; all give the same bits.
 trait Looks: Copy {
+    /// a · b + c, rounded once.
+    fn fused(self, a: Vec4, b: Vec4, c: Vec4) -> Vec4;
+
+    /// The whole number below.
+    ///
+    /// # Safety
+    /// It is an `i32`.
+    unsafe fn floor(self, number: f32) -> i32;
+
     /// Which of the sixteen nodes along the way through a block, whose columns begin at `first`, reach up to the ray, as bits.
     ///
     /// # Safety
@@ -239,7 +251,7 @@ trait Looks: Copy {
         octant: &Octant,
         way: &Way,
         first: &f32,
-        row: i32,
+        node: &i32,
         x: usize,
         y: usize,
     ) -> Option<Met>;
@@ -263,6 +275,7 @@ impl<'a> Single<'a> {
                 first: [0.0; 2],
                 last: [0.0; 2],
                 steep: 0.0,
+                relief: 0.5 * (scene.high - scene.low),
                 mirror: [0; 2],
                 line: 0,
                 start: 0,
@@ -321,13 +334,16 @@ impl<'a> Single<'a> {
 
     /// The distance of a ray's first hit, infinity for none; NaN for rays that are left to the `f64` walk.
     #[inline]
-    pub fn first_hit(&self, wide: bool, ray: &LocalRay) -> f32 {
+    pub fn first_hit(&self, simd: Simd, ray: &LocalRay) -> f32 {
         #[cfg(target_arch = "x86_64")]
-        if wide {
-            // SAFETY: `RayCaster` holds only instructions that are available, and asks for these.
-            return unsafe { x86::first_hit(self, ray) };
+        match simd {
+            // SAFETY: `RayCaster` holds only instructions that are available.
+            Simd::Avx512 => return unsafe { x86::first_hit(self, ray) },
+            // SAFETY: as above.
+            Simd::Avx2 => return unsafe { x86::portable(self, ray) },
+            Simd::Portable => {}
         }
-        let _ = wide;
+        let _ = simd;
         self.portable(ray)
     }
 
@@ -341,7 +357,7 @@ impl<'a> Single<'a> {
         let [origin, direction]: &[[f32; 4]; 2] = bytemuck::cast_ref(ray);
         let (origin, direction) = (Vec4::from_array(*origin), Vec4::from_array(*direction));
         // What the fourth numbers come to does not matter.
-        let place = origin * self.scale + self.offset;
+        let place = looks.fused(origin, self.scale, self.offset);
         let direction = direction * self.scale;
         // By comparison: a zero with a sign runs forward.
         let backward = direction.cmplt(Vec4::ZERO);
@@ -384,7 +400,7 @@ impl<'a> Single<'a> {
         let (major, along, inverse_major) =
             if X { (at.xxxx(), size.xxxx(), inverse.xxxx()) } else { (at.yyyy(), size.yyyy(), inverse.yyyy()) };
         let rate = size * inverse_major;
-        let base = at - rate * major;
+        let base = looks.fused(-rate, major, at);
         if rate.z.abs() > octant.steep {
             return f32::NAN;
         }
@@ -392,8 +408,8 @@ impl<'a> Single<'a> {
         let mut begin = if X { [at.x, at.y] } else { [at.y, at.x] };
         if start > 0.0 {
             branch();
-            begin[0] += start * along.x;
-            begin[1] += start * if X { size.y } else { size.x };
+            begin[0] = start.mul_add(along.x, begin[0]);
+            begin[1] = start.mul_add(if X { size.y } else { size.x }, begin[1]);
         }
         let mut way = Way {
             at: base,
@@ -402,13 +418,13 @@ impl<'a> Single<'a> {
             steps_rate: rate * self.per_step,
             inverse: along * inverse,
             start: begin[0],
-            end: major.x + end * along.x,
+            end: end.mul_add(along.x, major.x),
             from: begin[0],
         };
         let cell = |axis: usize| {
             let at = more(less(begin[axis], octant.last[axis]), octant.first[axis]);
             // SAFETY: just made to fit, NaN too.
-            unsafe { at.floor().to_int_unchecked::<i32>() }
+            unsafe { looks.floor(at) }
         };
         let cell = [cell(0), cell(1)];
 
@@ -449,15 +465,14 @@ impl<'a> Single<'a> {
                     if mask != 0 {
                         let lane = mask.trailing_zeros() as usize;
                         mask &= mask - 1;
+                        let row;
                         // SAFETY: masks have sixteen bits, and as many rows and columns were written. Above the first level there
                         // is one below.
-                        let below = unsafe {
+                        unsafe {
                             let here = &*floor;
                             column = &*(&raw const (*frame).columns).cast::<f32>().add(lane);
-                            let below = [
-                                (*frame).node[0] + lane as i32 / 2,
-                                *(&raw const (*frame).rows).cast::<i32>().add(lane),
-                            ];
+                            row = &*(&raw const (*frame).rows).cast::<i32>().add(lane);
+                            let below = [(*frame).node[0] + lane as i32 / 2, *row];
                             [x, y] = here.raster::<X>(octant, below);
                             if here.shift.low > 2 {
                                 (*frame).mask = mask;
@@ -465,9 +480,8 @@ impl<'a> Single<'a> {
                                 node = [8 * below[0], 8 * below[1]];
                                 continue 'blocks;
                             }
-                            below
-                        };
-                        if let Some(met) = looks.patches::<X>(self, octant, &way, column, below[1], x, y) {
+                        }
+                        if let Some(met) = looks.patches::<X>(self, octant, &way, column, row, x, y) {
                             let distance = more((met.s - major.x) * inverse_major.x, 0.0);
                             return if met.below { f32::NAN } else { distance };
                         }
@@ -493,7 +507,8 @@ impl<'a> Single<'a> {
                 if way.from >= way.end {
                     return f32::INFINITY;
                 }
-                if !(*floor).last {
+                // A ray that falls or rises so fast is soon through: it needs no larger blocks.
+                if !(*floor).last && 8.0 * (*floor).side * way.rate.z.abs() < octant.relief {
                     (frame, floor) = (frame.add(1), floor.add(1));
                     highest = frame;
                     node = node.map(|node| node >> 3);
@@ -557,6 +572,16 @@ fn more(a: f32, b: f32) -> f32 {
 
 impl Looks for Portable {
     #[inline(always)]
+    fn fused(self, a: Vec4, b: Vec4, c: Vec4) -> Vec4 {
+        a.mul_add(b, c)
+    }
+
+    #[inline(always)]
+    unsafe fn floor(self, number: f32) -> i32 {
+        number.floor() as i32
+    }
+
+    #[inline(always)]
     unsafe fn nodes<const X: bool>(
         self,
         octant: &Octant,
@@ -576,14 +601,14 @@ impl Looks for Portable {
             columns[lane] = column;
             let (enter, leave) = (more(column, way.from), less(column + floor.side, way.end));
             let edge = if lane & 1 == 0 { enter } else { leave };
-            let row = (slope * edge + row_at).floor() as i32 >> floor.shift.low;
+            let row = slope.mul_add(edge, row_at).floor() as i32 >> floor.shift.low;
             rows[lane] = row;
-            let lowest = way.steps_rate.z * (if octant.falls != 0 { leave } else { enter }) + way.steps.z;
+            let lowest = way.steps_rate.z.mul_add(if octant.falls != 0 { leave } else { enter }, way.steps.z);
             let within = row.wrapping_sub(first_row);
             let index = octant.tables.nodes.0[lane] ^ if X { within.wrapping_mul(8) } else { within };
             let twin = lane & 1 == 1 && rows[lane - 1] == row;
             let high = block.0[index as usize & 63];
-            let blocked = (0..8).contains(&within) && enter < leave && !twin && more(1.0, lowest) <= f32::from(high);
+            let blocked = (0..8).contains(&within) && enter < leave && !twin && more(lowest, 1.0) <= f32::from(high);
             mask |= u32::from(blocked) << lane;
         }
         // SAFETY: the caller's.
@@ -598,26 +623,23 @@ impl Looks for Portable {
         octant: &Octant,
         way: &Way,
         first: &f32,
-        row: i32,
+        node: &i32,
         x: usize,
         y: usize,
     ) -> Option<Met> {
         let (west, south) = (4 * x, 4 * y);
-        let (row_at, slope) = way.row::<X>();
-        let base = row_at - (4 * row) as f32;
+        let ((row_at, slope), inverse) = (way.row::<X>(), way.inverse_slope::<X>());
         let mirror = if X { octant.mirror } else { [octant.mirror[1], octant.mirror[0]] };
         for lane in 0..8 {
             let major = lane / 2;
             let column = major as f32 + first;
             let (enter, leave) = (more(column, way.start), less(column + 1.0, way.end));
-            let row = (slope * enter + base).floor();
-            let crossing = ((row + 1.0) - base) * way.inverse_slope::<X>();
-            let (a, b, row) = if lane & 1 == 0 {
-                (enter, less(crossing, leave), row)
-            } else {
-                (more(crossing, enter), leave, row + 1.0)
-            };
-            let minor = row as i32;
+            // Where the line beyond a row is crossed.
+            let crossing = |row: f32| less((row - row_at).mul_add(inverse, inverse), leave);
+            let row = slope.mul_add(enter, row_at).floor();
+            let (a, row) = if lane & 1 == 0 { (enter, row) } else { (crossing(row), row + 1.0) };
+            let b = crossing(row);
+            let minor = (row as i32).wrapping_sub(4 * node);
             if !(a < b && (0..4).contains(&minor)) {
                 continue;
             }
@@ -635,10 +657,10 @@ impl Looks for Portable {
             let (next, aside) = if X { (sample(1, 0), sample(0, 1)) } else { (sample(0, 1), sample(1, 0)) };
             let (rise, across) = (next - corner, aside - corner);
             let twist = (sample(1, 1) - aside) - rise;
-            let beside = base - row;
             let over = |s: f32| {
-                let (u, v) = (s - column, slope * s + beside);
-                (way.rate.z * s + (way.at.z - corner)) - (u * rise + v * (twist * u + across))
+                let (u, v) = (s - column, slope.mul_add(s, row_at - row));
+                let z = (-u).mul_add(rise, way.rate.z.mul_add(s, way.at.z - corner));
+                (-v).mul_add(twist.mul_add(u, across), z)
             };
             let (f0, f1) = (over(a), over(b));
             let length = b - a;
@@ -646,19 +668,20 @@ impl Looks for Portable {
             // Between two points above it the ray can only dip where both are nearer than the bend.
             let bend = 0.0 - bend;
             let near = more(0.0, bend);
-            if !(f0 <= near || f1 <= near) {
+            let lowest = less(f0, f1);
+            if lowest.is_nan() || lowest > near {
                 continue;
             }
             let slope = (f1 - f0) - bend;
-            let disc = slope * slope - (4.0 * bend) * f0;
+            let disc = slope.mul_add(slope, -((4.0 * bend) * f0));
             let dips = slope < 0.0 && slope + (bend + bend) > 0.0 && disc >= 0.0;
-            if !(f0 <= 0.0 || f1 <= 0.0 || dips) {
+            if lowest > 0.0 && !dips {
                 continue;
             }
             let root = more(disc, 0.0).sqrt();
             let root = if slope < 0.0 { (f0 + f0) / (root - slope) } else { (slope + root) / (-2.0 * bend) };
             let root = if f0 > 0.0 { less(root, 1.0) } else { 0.0 };
-            return Some(Met { s: root * length + a, below: f0 < 0.0 });
+            return Some(Met { s: root.mul_add(length, a), below: f0 < 0.0 });
         }
         None
     }

@@ -371,8 +371,8 @@ impl<L: Lanes> Packet<L> {
         let next_y = l.shl(l.iadd(l.shr(self.cell_y, self.level), one), self.level);
         let (tx, ty) = (lines_x.crossing(l, next_x), lines_y.crossing(l, next_y));
         let leave = l.max(l.min(l.min(tx, ty), self.end), self.t);
-        let z0 = l.add(self.z, l.mul(self.t, self.dz));
-        let z1 = l.add(self.z, l.mul(leave, self.dz));
+        let z0 = l.fused(self.t, self.dz, self.z);
+        let z1 = l.fused(leave, self.dz, self.z);
         let (column, row) = (l.ixor(self.cell_x, self.mirror_x), l.ixor(self.cell_y, self.mirror_y));
 
         // Nodes: left where the ray is clear of them.
@@ -435,12 +435,12 @@ impl<L: Lanes> Packet<L> {
             } else {
                 let (from_x, from_y) =
                     (l.float(l.isub(column, l.int(scene.cell[0]))), l.float(l.isub(row, l.int(scene.cell[1]))));
-                u0 = l.sub(l.flip(l.add(self.x, l.mul(self.t, self.dx)), self.sign_x), from_x);
-                v0 = l.sub(l.flip(l.add(self.y, l.mul(self.t, self.dy)), self.sign_y), from_y);
-                u1 = l.sub(l.flip(l.add(self.x, l.mul(leave, self.dx)), self.sign_x), from_x);
-                v1 = l.sub(l.flip(l.add(self.y, l.mul(leave, self.dy)), self.sign_y), from_y);
-                f0 = l.sub(z0, l.add(l.add(a, l.mul(east, u0)), l.mul(v0, l.add(north, l.mul(twist, u0)))));
-                f1 = l.sub(z1, l.add(l.add(a, l.mul(east, u1)), l.mul(v1, l.add(north, l.mul(twist, u1)))));
+                u0 = l.sub(l.flip(l.fused(self.t, self.dx, self.x), self.sign_x), from_x);
+                v0 = l.sub(l.flip(l.fused(self.t, self.dy, self.y), self.sign_y), from_y);
+                u1 = l.sub(l.flip(l.fused(leave, self.dx, self.x), self.sign_x), from_x);
+                v1 = l.sub(l.flip(l.fused(leave, self.dy, self.y), self.sign_y), from_y);
+                f0 = l.fused_from(v0, l.fused(twist, u0, north), l.fused_from(east, u0, l.sub(z0, a)));
+                f1 = l.fused_from(v1, l.fused(twist, u1, north), l.fused_from(east, u1, l.sub(z1, a)));
             }
             // f(s) = f0 + slope·s + bend·s², seen from above.
             let nought = l.splat(0.0);
@@ -449,7 +449,7 @@ impl<L: Lanes> Packet<L> {
             let bend = l.mul(l.mul(l.sub(nought, twist), l.sub(u1, u0)), l.sub(v1, v0));
             let bend = if SHEET { l.flip(bend, sign) } else { bend };
             let slope = l.sub(l.sub(g1, g0), bend);
-            let disc = l.sub(l.mul(slope, slope), l.mul(l.mul(l.splat(4.0), bend), g0));
+            let disc = l.fused_from(l.mul(l.splat(4.0), bend), g0, l.mul(slope, slope));
             let dips = l.and(l.lt(nought, bend), l.lt(slope, nought));
             let dips = l.and(dips, l.and(l.lt(nought, l.add(slope, l.add(bend, bend))), l.le(nought, disc)));
             hit = l.and(patches, l.or(l.or(l.le(g1, nought), l.le(g0, nought)), dips));
@@ -478,7 +478,7 @@ impl<L: Lanes> Packet<L> {
                     let root = l.div(above, l.select(falls, l.sub(root, slope), l.mul(l.splat(-2.0), bend)));
                     // Below already on entry, or 0/0: at the entry.
                     let root = l.select(l.lt(nought, g0), l.min(root, l.splat(1.0)), nought);
-                    l.add(self.t, l.mul(root, l.sub(leave, self.t)))
+                    l.fused(root, l.sub(leave, self.t), self.t)
                 };
                 let result = if SHEET { distance } else { l.select(below, l.splat(BELOW), distance) };
                 self.result = l.select(hit, result, self.result);
@@ -487,8 +487,8 @@ impl<L: Lanes> Packet<L> {
 
         // Across the nearer line; the other coordinate follows, but never back nor out of the node or the map.
         let x_first = l.le(tx, ty);
-        let mut follow_x = l.iadd(l.floor(l.add(self.x, l.mul(leave, self.dx))), self.base_x);
-        let mut follow_y = l.iadd(l.floor(l.add(self.y, l.mul(leave, self.dy))), self.base_y);
+        let mut follow_x = l.iadd(l.floor(l.fused(leave, self.dx, self.x)), self.base_x);
+        let mut follow_y = l.iadd(l.floor(l.fused(leave, self.dy, self.y)), self.base_y);
         if SHEET {
             // What counts is the crossing, not the rounded position.
             follow_x = l.iselect(l.lt(leave, lines_x.crossing(l, follow_x)), l.isub(follow_x, one), follow_x);

@@ -180,8 +180,8 @@ impl<L: Lanes> Rays<L> {
     fn enter_strip(&mut self, l: L, lines: (f32, f32), aside: f32, z: f32) {
         self.near = l.mul(l.splat(lines.0), self.per_major);
         self.far = l.mul(l.splat(lines.1), self.per_major);
-        self.aside = l.add(l.splat(aside), l.mul(self.near, self.minor));
-        self.height = l.add(l.splat(z), l.mul(self.near, self.up));
+        self.aside = l.fused(self.near, self.minor, l.splat(aside));
+        self.height = l.fused(self.near, self.up, l.splat(z));
     }
 
     /// Tests the strip's patch in a row; the row's lines are counted from the eye.
@@ -191,17 +191,17 @@ impl<L: Lanes> Rays<L> {
         let (twist, aside) = (l.splat(patch.twist), l.splat(patch.aside));
         // Height over the patch on the strip's first line, its slope there, and its bend.
         let v = l.sub(self.aside, l.splat(row as f32));
-        let above = l.sub(self.height, l.add(l.splat(patch.near), l.mul(aside, v)));
-        let along = l.mul(l.add(l.splat(patch.along), l.mul(twist, v)), self.major);
-        let slope = l.sub(l.sub(self.up, along), l.mul(aside, self.minor));
+        let above = l.fused_from(aside, v, l.sub(self.height, l.splat(patch.near)));
+        let along = l.fused(twist, v, l.splat(patch.along));
+        let slope = l.fused_from(aside, self.minor, l.fused_from(along, self.major, self.up));
         let bend = l.mul(twist, self.product);
         let enter = l.max(l.max(self.near, l.mul(l.splat(lines.0), self.per_minor)), zero);
         let leave = l.min(self.far, l.mul(l.splat(lines.1), self.per_minor));
         let (s0, s1) = (l.sub(enter, self.near), l.sub(leave, self.near));
-        let f0 = l.add(above, l.mul(s0, l.add(slope, l.mul(bend, s0))));
-        let f1 = l.add(above, l.mul(s1, l.add(slope, l.mul(bend, s1))));
+        let f0 = l.fused(s0, l.fused(bend, s0, slope), above);
+        let f1 = l.fused(s1, l.fused(bend, s1, slope), above);
         let twice = l.add(bend, bend);
-        let (slope0, slope1) = (l.add(slope, l.mul(twice, s0)), l.add(slope, l.mul(twice, s1)));
+        let (slope0, slope1) = (l.fused(twice, s0, slope), l.fused(twice, s1, slope));
         // Falls first and rises then: the lowest point lies between.
         let dips = l.and(l.lt(slope0, zero), l.lt(zero, slope1));
         let dips = l.and(dips, l.le(zero, discriminant(l, slope0, bend, f0)));
@@ -241,7 +241,7 @@ fn moves<L: Lanes>(l: L, way: L::F) -> L::M {
 
 #[inline(always)]
 fn discriminant<L: Lanes>(l: L, slope: L::F, bend: L::F, above: L::F) -> L::F {
-    l.sub(l.mul(slope, slope), l.mul(l.mul(l.splat(4.0), bend), above))
+    l.fused_from(l.mul(l.splat(4.0), bend), above, l.mul(slope, slope))
 }
 
 /// One bit for each lane of one or two vectors.

@@ -1,16 +1,31 @@
-//! The looks of `single.rs` with AVX-512.
+//! The looks of `single.rs` with AVX-512; and as they are, with what AVX2 and FMA make of them.
 
 use super::*;
 use std::arch::x86_64::*;
 
 /// Sixteen lanes of AVX-512 F, BW, DQ and VL.
 #[derive(Clone, Copy)]
-struct Avx512(());
+struct Avx512 {
+    /// The odd lanes, and the lower word of each lane: in registers from the ray's beginning to its end.
+    odd: __mmask16,
+    words: __mmask32,
+}
 
 /// The kernel compiled for AVX-512.
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,popcnt,lzcnt")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
 pub(super) fn first_hit(land: &Single, ray: &LocalRay) -> f32 {
-    land.walk(Avx512(()), ray)
+    let (mut odd, mut words) = (0xAAAA_u16, 0x5555_5555_u32);
+    // SAFETY: no instruction at all; the masks stay what they are, and the compiler does not know them.
+    unsafe {
+        std::arch::asm!("/* {0} {1} */", inout(kreg) odd, inout(kreg) words, options(nomem, nostack, preserves_flags));
+    }
+    land.walk(Avx512 { odd, words }, ray)
+}
+
+/// The looks in plain Rust, where a · b + c is one instruction.
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+pub(super) fn portable(land: &Single, ray: &LocalRay) -> f32 {
+    land.walk(Portable, ray)
 }
 
 const DOWN: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
@@ -39,19 +54,13 @@ fn pick((a, b): (__m512, __m512), index: __m256i) -> __m256 {
 
 /// Height of the ray over bilinear patches at s.
 #[inline(always)]
-fn over<const X: bool>(
-    way: &Way,
-    (rise, across, twist): (__m256, __m256, __m256),
-    [column, beside, height]: [__m256; 3],
-    s: __m256,
-) -> __m256 {
+fn over([slope, fall, column, behind, height]: [__m256; 5], [rise, across, twist]: [__m256; 3], s: __m256) -> __m256 {
     unsafe {
         let u = _mm256_sub_ps(s, column);
-        let v = _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(way.row::<X>().1), s), beside);
-        let side = _mm256_mul_ps(v, _mm256_add_ps(_mm256_mul_ps(twist, u), across));
-        let ground = _mm256_add_ps(_mm256_mul_ps(u, rise), side);
-        let z = _mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(way.rate.z), s), height);
-        _mm256_sub_ps(z, ground)
+        let v = _mm256_fmadd_ps(slope, s, behind);
+        let z = _mm256_fmadd_ps(fall, s, height);
+        let z = _mm256_fnmadd_ps(u, rise, z);
+        _mm256_fnmadd_ps(v, _mm256_fmadd_ps(twist, u, across), z)
     }
 }
 
@@ -62,14 +71,24 @@ fn at_the_border<const X: bool>(
     octant: &Octant,
     way: &Way,
     first: &f32,
-    row: i32,
+    node: &i32,
     x: usize,
     y: usize,
 ) -> Option<Met> {
-    Portable.patches::<X>(land, octant, way, first, row, x, y)
+    Portable.patches::<X>(land, octant, way, first, node, x, y)
 }
 
 impl Looks for Avx512 {
+    #[inline(always)]
+    fn fused(self, a: Vec4, b: Vec4, c: Vec4) -> Vec4 {
+        unsafe { _mm_fmadd_ps(a.into(), b.into(), c.into()).into() }
+    }
+
+    #[inline(always)]
+    unsafe fn floor(self, number: f32) -> i32 {
+        unsafe { _mm_cvt_roundss_i32::<DOWN>(_mm_set_ss(number)) }
+    }
+
     #[inline(always)]
     unsafe fn nodes<const X: bool>(
         self,
@@ -94,25 +113,26 @@ impl Looks for Avx512 {
             let enter = _mm512_max_ps(column, _mm512_set1_ps(way.from));
             let next = _mm512_add_ps(column, _mm512_set1_ps(floor.side));
             let leave = _mm512_min_ps(next, _mm512_set1_ps(way.end));
-            let edge = _mm512_mask_blend_ps(0xAAAA, enter, leave);
-            let row = _mm512_add_ps(_mm512_mul_ps(_mm512_set1_ps(slope), edge), _mm512_set1_ps(row_at));
+            let edge = _mm512_mask_blend_ps(self.odd, enter, leave);
+            let row = _mm512_fmadd_ps(_mm512_set1_ps(slope), edge, _mm512_set1_ps(row_at));
             let row = _mm512_cvt_roundps_epi32::<DOWN>(row);
             let row = _mm512_sra_epi32(row, _mm_load_si128((&raw const floor.shift).cast()));
             _mm512_store_si512((*frame).rows.0.as_mut_ptr().cast(), row);
             let row = _mm512_sub_epi32(row, _mm512_set1_epi32(anew(&*frame).node[1]));
             let lowest = _mm512_mask_blend_ps(octant.falls, enter, leave);
-            let lowest =
-                _mm512_add_ps(_mm512_mul_ps(_mm512_set1_ps(way.steps_rate.z), lowest), _mm512_set1_ps(way.steps.z));
-            let lowest = _mm512_max_ps(_mm512_set1_ps(tables.one), lowest);
+            let lowest = _mm512_fmadd_ps(_mm512_set1_ps(way.steps_rate.z), lowest, _mm512_set1_ps(way.steps.z));
+            let lowest = _mm512_max_ps(lowest, _mm512_set1_ps(tables.one));
+            let never = _mm512_castps_si512(lowest);
             let lowest = _mm512_cvt_roundps_epi32::<UP>(lowest);
             let index = _mm512_xor_si512(table, if X { _mm512_slli_epi32::<3>(row) } else { row });
-            let high = _mm512_permutex2var_epi16(south, index, north);
-            let high = _mm512_and_si512(high, _mm512_set1_epi32(tables.word));
+            let high = _mm512_maskz_permutex2var_epi16(self.words, south, index, north);
             let inside = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(enter, leave);
             let inside = _mm512_mask_cmplt_epu32_mask(inside, row, _mm512_set1_epi32(tables.eight));
-            let twin = _mm512_cmpeq_epi32_mask(row, _mm512_shuffle_epi32::<0b10_11_00_01>(row));
-            let blocked = _mm512_mask_cmple_epu32_mask(inside, lowest, high);
-            u32::from(blocked) & !(u32::from(twin) & 0xAAAA)
+            // The row left counts if it is not the row entered; a row entered always does, no row being what the bits of 1.0 and
+            // more say.
+            let entered = _mm512_mask_shuffle_epi32::<0b10_10_00_00>(never, self.odd, row);
+            let inside = _mm512_mask_cmpneq_epi32_mask(inside, row, entered);
+            u32::from(_mm512_mask_cmple_epu32_mask(inside, lowest, high))
         }
     }
 
@@ -123,13 +143,13 @@ impl Looks for Avx512 {
         octant: &Octant,
         way: &Way,
         first: &f32,
-        row: i32,
+        node: &i32,
         x: usize,
         y: usize,
     ) -> Option<Met> {
         // At the map's north and east the samples of fewer patches must do.
         if x >= land.whole[0] || y >= land.whole[1] {
-            return at_the_border::<X>(land, octant, &{ *way }, first, row, x, y);
+            return at_the_border::<X>(land, octant, &{ *way }, first, node, x, y);
         }
         let corner = 4 * (y * land.columns + x);
         let way = anew(way);
@@ -143,16 +163,18 @@ impl Looks for Avx512 {
             let column = _mm256_add_ps(columns, _mm256_set1_ps(*anew(first)));
             let enter = _mm256_max_ps(column, _mm256_set1_ps(way.start));
             let leave = _mm256_min_ps(_mm256_add_ps(column, one), _mm256_set1_ps(way.end));
-            let base = _mm256_set1_ps(row_at - (4 * row) as f32);
-            let row = _mm256_floor_ps(_mm256_add_ps(_mm256_mul_ps(_mm256_set1_ps(slope), enter), base));
-            let crossing = _mm256_sub_ps(_mm256_add_ps(row, one), base);
-            let crossing = _mm256_mul_ps(crossing, _mm256_set1_ps(way.inverse_slope::<X>()));
-            let a = _mm256_blend_ps::<0xAA>(enter, _mm256_max_ps(crossing, enter));
-            let b = _mm256_blend_ps::<0x55>(leave, _mm256_min_ps(crossing, leave));
-            let row = _mm256_add_ps(row, odd);
-            let minor = _mm256_cvttps_epi32(row);
+            let base = _mm256_set1_ps(row_at);
+            let inverse = _mm256_set1_ps(way.inverse_slope::<X>());
+            let slope = _mm256_set1_ps(slope);
+            let row = _mm256_add_ps(_mm256_floor_ps(_mm256_fmadd_ps(slope, enter, base)), odd);
+            let place =
+                _mm256_sub_epi32(_mm256_cvttps_epi32(row), _mm256_slli_epi32::<2>(_mm256_set1_epi32(*anew(node))));
+            // The line beyond the row is crossed at the piece's end; with the next it begins.
+            let behind = _mm256_sub_ps(base, row);
+            let b = _mm256_min_ps(_mm256_fnmadd_ps(behind, inverse, inverse), leave);
+            let a = _mm256_mask_moveldup_ps(enter, self.odd as u8, b);
             let valid = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
-            let valid = _mm256_mask_cmplt_epu32_mask(valid, minor, _mm256_set1_epi32(tables.four));
+            let valid = _mm256_mask_cmplt_epu32_mask(valid, place, _mm256_set1_epi32(tables.four));
 
             // SAFETY: five rows of eight samples, of which five are looked at; nodes that are whole have as many, and where rows
             // are mirrored they are the same ones from the other end.
@@ -163,39 +185,38 @@ impl Looks for Avx512 {
             };
             let (near, far) = ((two(0), two(2)), (two(1), two(3)));
             let tables = &tables.samples;
-            let minor = if X {
-                _mm256_slli_epi32::<3>(minor)
+            let place = if X {
+                _mm256_slli_epi32::<3>(place)
             } else {
-                _mm256_xor_si256(minor, _mm256_set1_epi32(octant.mirror[1] & 3))
+                _mm256_xor_si256(place, _mm256_set1_epi32(octant.mirror[1] & 3))
             };
-            let this = _mm256_add_epi32(minor, _mm256_load_si256(tables[0].0.as_ptr().cast()));
-            let that = _mm256_add_epi32(minor, _mm256_load_si256(tables[1].0.as_ptr().cast()));
+            let this = _mm256_add_epi32(place, _mm256_load_si256(tables[0].0.as_ptr().cast()));
+            let that = _mm256_add_epi32(place, _mm256_load_si256(tables[1].0.as_ptr().cast()));
             let (corner, beside, beyond, last) = (pick(near, this), pick(near, that), pick(far, this), pick(far, that));
             let (next, aside) = if X { (beside, beyond) } else { (beyond, beside) };
             let (rise, across) = (_mm256_sub_ps(next, corner), _mm256_sub_ps(aside, corner));
             let twist = _mm256_sub_ps(_mm256_sub_ps(last, aside), rise);
 
             let height = _mm256_sub_ps(_mm256_set1_ps(way.at.z), corner);
-            let surface = (rise, across, twist);
-            let lines = [column, _mm256_sub_ps(base, row), height];
-            let (f0, f1) = (over::<X>(way, surface, lines, a), over::<X>(way, surface, lines, b));
+            let fall = _mm256_set1_ps(way.rate.z);
+            let lines = [slope, fall, column, behind, height];
+            let (f0, f1) = (over(lines, [rise, across, twist], a), over(lines, [rise, across, twist], b));
             let length = _mm256_sub_ps(b, a);
-            let bend = _mm256_mul_ps(_mm256_mul_ps(twist, _mm256_set1_ps(slope)), _mm256_mul_ps(length, length));
+            let bend = _mm256_mul_ps(_mm256_mul_ps(twist, slope), _mm256_mul_ps(length, length));
             let bend = _mm256_sub_ps(zero, bend);
             let near = _mm256_max_ps(zero, bend);
-            let near = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, f0, near)
-                | _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, f1, near);
+            let near = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, _mm256_min_ps(f0, f1), near);
             if near == 0 {
                 return None;
             }
             let slope = _mm256_sub_ps(_mm256_sub_ps(f1, f0), bend);
             let disc = _mm256_mul_ps(_mm256_mul_ps(_mm256_set1_ps(4.0), bend), f0);
-            let disc = _mm256_sub_ps(_mm256_mul_ps(slope, slope), disc);
+            let disc = _mm256_fmsub_ps(slope, slope, disc);
             let falls = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(slope, zero);
             let dips = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(falls, zero, disc);
             let turns = _mm256_add_ps(slope, _mm256_add_ps(bend, bend));
             let dips = _mm256_mask_cmp_ps_mask::<_CMP_LT_OQ>(dips, zero, turns);
-            let under = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(f0, zero) | _mm256_cmp_ps_mask::<_CMP_LE_OQ>(f1, zero);
+            let under = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(_mm256_min_ps(f0, f1), zero);
             let hit = near & (under | dips);
             if hit == 0 {
                 return None;
@@ -206,7 +227,7 @@ impl Looks for Avx512 {
             let under = _mm256_mask_blend_ps(falls, under, _mm256_sub_ps(root, slope));
             let root = _mm256_min_ps(_mm256_div_ps(above, under), one);
             let root = _mm256_maskz_mov_ps(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(zero, f0), root);
-            let s = _mm256_add_ps(_mm256_mul_ps(root, length), a);
+            let s = _mm256_fmadd_ps(root, length, a);
             let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(f0, zero);
             let first = hit & hit.wrapping_neg();
             let s = _mm256_cvtss_f32(_mm256_maskz_compress_ps(first, s));
