@@ -235,7 +235,8 @@ fn fine_solution(
     let swallow: Vec<f32> =
         (0..n * n).map(|i| (((3.5 - depth(place(i))) / 3.5).clamp(0.0, 1.2).powi(2) * 0.08) as f32).collect();
     let dt = 2.0 * std::f64::consts::PI / omega / 90.0;
-    let steps = 90 * 26;
+    // Until what the island throws back has gone round, too.
+    let steps = 90 * 60;
     let (mut now, mut before) = (vec![0.0f32; n * n], vec![0.0f32; n * n]);
     let mut sums = vec![(0.0f64, 0.0f64); places.len()];
     let c = (dt * dt / (step * step)) as f32;
@@ -421,6 +422,27 @@ fn slopes_are_derivatives_and_nothing_exceeds_the_bounds() {
     assert!(steep.stretch < 1.0, "{steep:?}");
     assert!(sea.roughness(0.0) == 0.0 && sea.roughness(3.0) <= sea.roughness(60.0));
     assert!(sea.roughness(1e9) >= 0.99 * bounds.height / 1.4);
+}
+
+#[test]
+fn what_is_shorter_than_a_footprint_is_known_by_octaves() {
+    let depth = 12.0;
+    let sea = sea(&beach(0.03, depth), &[wave(9.0, 0.01, 0.25 * TAU, depth)], depth, &unsmoothed());
+    // Towards the shore the wave becomes shorter and higher.
+    let seen: Vec<(f64, f64)> = (0..480)
+        .map(|y| sea.component(0, MIDDLE, f64::from(y)))
+        .map(|(amplitude, wavenumber)| (TAU / wavenumber.length(), amplitude))
+        .collect();
+    let mut octaves = Vec::new();
+    for octave in 3..8 {
+        let length = f64::from(1 << octave);
+        let told = f64::from(sea.roughness(length as f32)) / 1.4;
+        let highest = seen.iter().filter(|s| s.0 < length).map(|s| s.1).fold(0.0, f64::max);
+        assert!(told >= 0.999 * highest, "{told} below {length} m, not {highest}");
+        octaves.push(highest);
+    }
+    println!("{octaves:?}");
+    assert!(octaves.iter().filter(|highest| **highest > 0.0).count() > 2);
 }
 
 #[test]

@@ -11,7 +11,9 @@
 //!
 //! *How right it is* (`tests/shore.rs`). On a plane beach Snell's and Green's laws hold within 0.1 %, the flux of energy over shoals within 1.2 %.
 //! Behind a half-plane the amplitude is that of A. Sommerfeld's soft screen to 0.03 (rms; 0.08 at worst) of the incoming one within 45° of the
-//! shadow's edge. Round an island phases are within 1 % (rms) of those of a fine solution in time, everywhere but deep in the lee. Phases are kept
+//! shadow's edge. Round an island with a shelf that turns waves right round, phases are within 1.2 % (rms) of those of a fine solution in time, and within 2 %
+//! at 94 of 100 places, but not on the shelf's lee flanks: waves arrive there that have turned by more than a march can follow, and neither more terms
+//! of the fraction nor a finer grid brings them back. Phases are kept
 //! to 5·10⁻⁵ rad and amplitudes to 6·10⁻⁵ of the incoming ones; linear interpolation of phases errs by an eighth of what the step of the relative
 //! phase from node to node changes by: 10⁻³ rad in 2 m of water on a slope of 1 : 30 with nodes 2 m apart. Slopes are the exact derivative
 //! of that surface, which has a kink of the same order at the borders of cells.
@@ -155,8 +157,9 @@ pub struct ShoreSea {
     bounds: Bounds,
     /// Largest amplitude (m) of each component by octaves of its local wavelength.
     by_length: Vec<[f32; BINS]>,
-    /// Scratch: sums of slopes by cell.
-    steepness: Vec<f32>,
+    /// Scratch: what the waves can be at most by cell, and how much of the sideways motion is let be by node.
+    cells: Vec<[f32; 3]>,
+    held: Vec<f32>,
     scratch: Scratch,
     /// Scratch: how many rings inland a node lies.
     rings: Vec<u32>,
@@ -233,7 +236,8 @@ impl ShoreSea {
             time: 0.0,
             bounds: Bounds::default(),
             by_length: Vec::new(),
-            steepness: Vec::new(),
+            cells: Vec::new(),
+            held: Vec::new(),
             scratch: Scratch::default(),
             rings: Vec::new(),
         };
@@ -312,31 +316,28 @@ impl ShoreSea {
         self.places.resize(count + 1, self.open);
         self.places[..count].par_iter_mut().enumerate().for_each(|(i, place)| {
             let (energy, unbroken) = total(i);
-            let energy = energy.min(solve::limit(grid.s[i], rim, settings));
+            let energy = energy.min(grid.cap[i]);
             let height = 4.0 * unbroken.max(0.0).sqrt();
             *place = ground.place(stretch(grid.s[i]), energy, Some((grid.slope[i], height)));
         });
 
         // The waves, no higher together than the depth bears.
-        self.records.resize((count + 1) * blocks, Record::NONE);
+        solve::resize(&mut self.records, (count + 1) * blocks, Record::NONE);
         self.records[count * blocks..].fill(Record::OPEN);
         if blocks > 0 {
             self.records[..count * blocks].par_chunks_exact_mut(blocks).enumerate().for_each(|(i, records)| {
                 let all = total(i).0;
-                let cap = solve::limit(grid.s[i], rim, settings);
+                let cap = grid.cap[i];
                 let by = if all > cap { (cap / all).sqrt() } else { 1.0 };
                 let mut seat = 0;
                 for batch in batches {
-                    let from = &batch.records[i];
-                    let (block, lane, count) = (seat / LANES, seat % LANES, batch.members.len());
-                    let here = count.min(LANES - lane);
-                    records[block].phase[lane..lane + here].copy_from_slice(&from.phase[..here]);
-                    records[block].amplitude[lane..lane + here].copy_from_slice(&from.amplitude[..here]);
-                    if here < count {
-                        records[block + 1].phase[..count - here].copy_from_slice(&from.phase[here..count]);
-                        records[block + 1].amplitude[..count - here].copy_from_slice(&from.amplitude[here..count]);
+                    let count = batch.members.len();
+                    for wave in &batch.records[i * count..][..count] {
+                        let record = &mut records[seat / LANES];
+                        record.phase[seat % LANES] = *wave as i16;
+                        record.amplitude[seat % LANES] = (wave >> 16) as u16;
+                        seat += 1;
                     }
-                    seat += count;
                 }
                 if by < 1.0 {
                     records.iter_mut().for_each(|r| r.amplitude.iter_mut().for_each(|a| *a = solve::lowered(*a, by)));

@@ -40,6 +40,17 @@ pub(super) fn nearest(x: f32) -> f32 {
     (x + ROUNDER) - ROUNDER
 }
 
+/// One over a number from 10⁻³⁰ to 10³⁰, to a relative error of 2·10⁻⁷: the exponent's sign turned round is a guess to 5 %, which a step of
+/// Newton's and one of E. Halley's method better. Sixteen such cost a third of what as many divisions do.
+#[inline(always)]
+pub(super) fn inverse(x: f32) -> f32 {
+    let guess = f32::from_bits(0x7EF1_27EA_u32.wrapping_sub(x.to_bits()));
+    let off = (-x).mul_add(guess, 1.0);
+    let better = off.mul_add(guess, guess);
+    let off = (-x).mul_add(better, 1.0);
+    off.mul_add(off, off).mul_add(better, better)
+}
+
 /// Sine and cosine of an angle in turns, of magnitude below 10⁶; to 7·10⁻⁷.
 #[inline(always)]
 pub(super) fn sine_cosine(turns: f32) -> (f32, f32) {
@@ -106,6 +117,8 @@ mod tests {
             assert!((turns - t - (turns - t).round()).abs() < 6e-7, "{t}: {turns}");
             let x = -(i + 4000) as f32 * 0.01;
             assert!((f64::from(decay(x)) / f64::from(x).exp() - 1.0).abs() < 4e-6, "{x}");
+            let x = 10f32.powf(i as f32 / 134.0);
+            assert!((f64::from(inverse(x)) * f64::from(x) - 1.0).abs() < 2e-7, "{x}");
         }
         assert_eq!(angle(0.0, 0.0), 0.0);
         assert_eq!(decay(-1e9), 0.0);

@@ -13,7 +13,7 @@
 //!
 //! Sixteen waves march in step, one a lane. Where all waves together are higher than the depth allows they are lowered to that, and stay so.
 
-use super::lanes::{Complex, LANES, Lanes, angle, sine_cosine};
+use super::lanes::{Complex, LANES, Lanes, angle, inverse, sine_cosine};
 use multiversion::multiversion;
 
 /// Steps of the tables over depth.
@@ -43,30 +43,19 @@ impl Record {
 
 /// Sixteen waves that march in the same direction.
 pub(super) struct Waves {
-    /// k·s and c_g over s (see [`Node::s`]).
-    pub(super) table: Vec<[Lanes; 2]>,
+    /// Over s (see [`Node::s`]): p·s, p^−½, and s times the amplitude that waves of one flux have, which is 1 in the open.
+    pub(super) table: Vec<[Lanes; 3]>,
     /// Part of the wave number across the march (rad/m), which Snell's law keeps.
     pub(super) across: Lanes,
     /// Part along the march in the open (rad/m).
     pub(super) along: Lanes,
-    /// Largest wave number that the grid resolves (rad/m).
-    pub(super) finest: Lanes,
-    /// c_g p / k in the open.
-    pub(super) flux: Lanes,
     /// Half the square of the amplitude in the open (m²).
     pub(super) energy: Lanes,
 }
 
 impl Waves {
     pub(super) fn new() -> Waves {
-        Waves {
-            table: vec![[Lanes::ONE; 2]; STEPS + 2],
-            across: Lanes::ZERO,
-            along: Lanes::ONE,
-            finest: Lanes::ONE,
-            flux: Lanes::ONE,
-            energy: Lanes::ZERO,
-        }
+        Waves { table: vec![[Lanes::ONE; 3]; STEPS + 2], across: Lanes::ZERO, along: Lanes::ONE, energy: Lanes::ZERO }
     }
 }
 
@@ -96,6 +85,33 @@ pub(super) struct Told {
     pub(super) unbroken: f32,
 }
 
+/// What a step works on at a node.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Site {
+    /// p, and its square root.
+    p: Lanes,
+    root: Lanes,
+    /// b p^−½.
+    u: Complex,
+    /// After elimination: the unknown here is `known` less `slope` times that of the next node towards the middle.
+    known: Complex,
+    slope: Complex,
+    /// 1 / |q⁻|².
+    part: Lanes,
+}
+
+impl Site {
+    const NONE: Site = Site {
+        p: Lanes::ONE,
+        root: Lanes::ONE,
+        u: Complex::ZERO,
+        known: Complex::ZERO,
+        slope: Complex::ZERO,
+        part: Lanes::ONE,
+    };
+}
+
 /// A march: one row of waves, and what is needed to go to the next.
 #[derive(Default)]
 pub(super) struct March {
@@ -103,39 +119,30 @@ pub(super) struct March {
     pub(super) b: Vec<Complex>,
     /// Which part of the energy has not broken.
     pub(super) whole: Vec<f32>,
-    p: Vec<Lanes>,
-    v: Vec<Complex>,
-    g: Vec<Complex>,
-    inverse: Vec<Complex>,
-    part: Vec<Lanes>,
-    root: Vec<Lanes>,
-    pub(super) records: Vec<Record>,
+    sites: Vec<Site>,
+    /// What is told of the waves at each node: [`Record`]s, with phase and amplitude of a wave in the lower and the upper half of its bits.
+    pub(super) records: Vec<[u32; LANES]>,
     pub(super) told: Vec<Told>,
 }
 
 impl March {
     /// Starts with the waves of the open sea on a row of `nodes`.
     pub(super) fn start(&mut self, nodes: usize) {
-        let March { b, whole, p, v, g, inverse, part, root, records, told } = self;
-        for (list, value) in [(b, Complex::ONE), (v, Complex::ZERO), (g, Complex::ZERO), (inverse, Complex::ZERO)] {
+        fn fill<T: Clone>(list: &mut Vec<T>, nodes: usize, value: T) {
             list.clear();
             list.resize(nodes, value);
         }
-        whole.clear();
-        whole.resize(nodes, 1.0);
-        for list in [p, part, root] {
-            list.clear();
-            list.resize(nodes, Lanes::ONE);
-        }
-        records.clear();
-        records.resize(nodes, Record::NONE);
-        told.clear();
-        told.resize(nodes, Told::default());
+        fill(&mut self.b, nodes, Complex::ONE);
+        fill(&mut self.whole, nodes, 1.0);
+        fill(&mut self.sites, nodes, Site::NONE);
+        fill(&mut self.records, nodes, [0; LANES]);
+        fill(&mut self.told, nodes, Told::default());
     }
 }
 
+/// Where in the tables a depth is: the entry below, and how far on to the next.
 #[inline(always)]
-fn entry(s: f32) -> (usize, f32) {
+pub(super) fn entry(s: f32) -> (usize, f32) {
     let at = s * STEPS as f32;
     let index = (at as usize).min(STEPS - 1);
     (index, at - index as f32)
@@ -143,39 +150,36 @@ fn entry(s: f32) -> (usize, f32) {
 
 /// Lets the waves of a row break where they are too high, and tells them.
 ///
-/// `share` is how many times the energy of this batch all batches have, where that is not told by the nodes.
+/// `share` is how many times the energy of this batch all batches have, where that is not told by the nodes. `records` says whether the waves
+/// themselves are told, too.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-pub(super) fn settle(march: &mut March, waves: &Waves, row: &[Node], share: f32) {
+pub(super) fn settle(march: &mut March, waves: &Waves, row: &[Node], share: f32, records: bool) {
     let n = row.len();
     let b = &mut march.b[..n];
+    let tell = records;
     let (whole, records, told) = (&mut march.whole[..n], &mut march.records[..n], &mut march.told[..n]);
-    let (finest, across, open_flux, open_energy) = (waves.finest, waves.across, waves.flux, waves.energy);
+    let open_energy = waves.energy;
     for j in 0..n {
         let node = row[j];
         if node.near > 1.0 {
             b[j] = Complex::ZERO;
-            records[j] = Record::NONE;
+            records[j] = [0; LANES];
             told[j] = Told { energy: 0.0, unbroken: 0.0 };
             continue;
         }
         let (index, f) = entry(node.s);
-        let (low, high) = (waves.table[index], waves.table[index + 1]);
-        let inverse = 1.0 / node.s;
+        let (low, high) = (waves.table[index][2], waves.table[index + 1][2]);
+        let over = 1.0 / node.s;
         let mut z = b[j];
-        let (mut re, mut im) = ([0.0f32; LANES], [0.0f32; LANES]);
+        let (mut re, mut im, mut own) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
         let (mut energies, mut fluxes) = ([0.0f32; LANES], [0.0f32; LANES]);
         for l in 0..LANES {
-            let k = (f.mul_add(high[0].0[l] - low[0].0[l], low[0].0[l]) * inverse).min(finest.0[l]);
-            let speed = f.mul_add(high[1].0[l] - low[1].0[l], low[1].0[l]);
-            let q = across.0[l];
-            let p = k.mul_add(k, -(q * q)).max(0.02 * k * k).sqrt();
-            // Amplitude of this flux at this speed.
-            let square = open_flux.0[l] * k / (speed * p);
-            let factor = square.sqrt();
-            (re[l], im[l]) = (z.re[l] * factor, z.im[l] * factor);
-            let flux = z.re[l].mul_add(z.re[l], z.im[l] * z.im[l]) * open_energy.0[l];
-            energies[l] = flux * square;
-            fluxes[l] = flux;
+            let gain = f.mul_add(high.0[l] - low.0[l], low.0[l]) * over;
+            (re[l], im[l]) = (z.re[l] * gain, z.im[l] * gain);
+            let square = z.re[l].mul_add(z.re[l], z.im[l] * z.im[l]);
+            own[l] = square * (gain * gain);
+            energies[l] = own[l] * open_energy.0[l];
+            fluxes[l] = square * open_energy.0[l];
         }
         let (energy, flux) = (sum(&energies), sum(&fluxes));
         let all = energy.mul_add(share, node.others);
@@ -190,37 +194,31 @@ pub(super) fn settle(march: &mut March, waves: &Waves, row: &[Node], share: f32)
         }
         told[j] = Told { energy: energy * lower * lower, unbroken: flux / whole[j].max(1e-4) };
         whole[j] *= lower * lower;
-        // Towards the rim the open sea takes over, by energy: waves that are out of step with it must not cancel it.
-        let (c, o) = ((1.0 - node.open) * lower, node.open);
+        if !tell {
+            continue;
+        }
         let (mut amplitude, mut phase) = ([0i32; LANES], [0i32; LANES]);
-        for l in 0..LANES {
-            let (x, y) = (re[l].mul_add(c, o), im[l] * c);
-            let length = x.mul_add(x, y * y).sqrt();
-            let own = re[l].mul_add(re[l], im[l] * im[l]) * lower * lower;
-            let wanted = own.mul_add(1.0 - o, o).sqrt();
-            let told = if o > 0.0 { wanted.min(2.0 * length) } else { length };
-            amplitude[l] = whole_number((told * UNITS).min(65_535.0));
-            phase[l] = whole_number(angle(x, y) * 65_536.0);
+        if node.open > 0.0 {
+            // Towards the rim the open sea takes over, by energy: waves that are out of step with it must not cancel it.
+            let (c, o) = ((1.0 - node.open) * lower, node.open);
+            for l in 0..LANES {
+                let (x, y) = (re[l].mul_add(c, o), im[l] * c);
+                let length = x.mul_add(x, y * y).sqrt();
+                let wanted = (own[l] * lower * lower).mul_add(1.0 - o, o).sqrt();
+                amplitude[l] = whole_number((wanted.min(2.0 * length) * UNITS).min(65_535.0));
+                phase[l] = whole_number(angle(x, y) * 65_536.0);
+            }
+        } else {
+            let units = lower * UNITS;
+            for l in 0..LANES {
+                amplitude[l] = whole_number((own[l].sqrt() * units).min(65_535.0));
+                phase[l] = whole_number(angle(re[l], im[l]) * 65_536.0);
+            }
         }
-        let record = &mut records[j];
         for l in 0..LANES {
-            record.amplitude[l] = amplitude[l] as u16;
-            record.phase[l] = phase[l] as i16;
+            records[j][l] = (amplitude[l] << 16 | phase[l] & 0xFFFF).cast_unsigned();
         }
     }
-}
-
-/// q⁺ v, where q⁺ is b + i (d p − damping).
-#[inline(always)]
-fn weighed(p: &Lanes, v: &Complex, b: f32, d: f32, damping: f32) -> Complex {
-    let mut to = Complex::ZERO;
-    for l in 0..LANES {
-        let i = d.mul_add(p.0[l], -damping);
-        let (re, im) = (v.re[l], v.im[l]);
-        to.re[l] = b.mul_add(re, -(i * im));
-        to.im[l] = b.mul_add(im, i * re);
-    }
-    to
 }
 
 /// The nearest whole number, for magnitudes below 2²²: its bits stand at the end of the sum's.
@@ -240,137 +238,216 @@ pub(super) fn sum(x: &[f32; LANES]) -> f32 {
     (b[0] + b[2]) + (b[1] + b[3])
 }
 
+/// A term of the fraction, on a grid.
+struct Term {
+    /// bₙ, and its square.
+    b: f32,
+    square: f32,
+    /// Half of aₙ times the step.
+    d: f32,
+    /// The imaginary part of bₙ far from land.
+    least: f32,
+    /// 1 / (distance of nodes)².
+    steep: f32,
+    /// steep² + drift².
+    zz: Lanes,
+}
+
+impl Term {
+    #[inline(always)]
+    fn damping(&self, node: &Node) -> f32 {
+        node.near.min(1.0).mul_add(BESIDE_LAND, self.least)
+    }
+}
+
+/// D = p² / q⁻ at a node, with 1 / |q⁻|²; q⁻ = bₙ − i (δ + d p).
+#[inline(always)]
+fn diagonal(site: &Site, term: &Term, damping: f32) -> (Complex, Lanes) {
+    let (mut to, mut part) = (Complex::ZERO, Lanes::ZERO);
+    for l in 0..LANES {
+        let p = site.p.0[l];
+        let i = term.d.mul_add(p, damping);
+        part.0[l] = inverse(i.mul_add(i, term.square));
+        let size = p * p * part.0[l];
+        (to.re[l], to.im[l]) = (size * term.b, size * i);
+    }
+    (to, part)
+}
+
+/// One node of the elimination, given the reciprocal of the diagonal and the `known` of the node before; tells its own. `drift` is
+/// that of the side from which the elimination comes.
+#[inline(always)]
+fn eliminate(
+    site: &mut Site,
+    node: &Node,
+    term: &Term,
+    drift: &Lanes,
+    before: &(Complex, Complex),
+) -> (Complex, Complex) {
+    let (own, part) = diagonal(site, term, term.damping(node));
+    let (chain, last, u) = (before.0, before.1, site.u);
+    let (mut to_chain, mut to, mut slope) = (Complex::ZERO, Complex::ZERO, Complex::ZERO);
+    for l in 0..LANES {
+        let (drift, zz) = (drift.0[l], term.zz.0[l]);
+        let re = (-zz).mul_add(chain.re[l], own.re[l] - 2.0 * term.steep);
+        let im = (-zz).mul_add(chain.im[l], own.im[l]);
+        let over = 1.0 / re.mul_add(re, im * im);
+        let (cr, ci) = (re * over, -(im * over));
+        // i D u less the node before times steep − i drift.
+        let xr = -own.re[l].mul_add(u.im[l], own.im[l] * u.re[l]);
+        let xi = own.re[l].mul_add(u.re[l], -(own.im[l] * u.im[l]));
+        let xr = (-drift).mul_add(last.im[l], (-term.steep).mul_add(last.re[l], xr));
+        let xi = drift.mul_add(last.re[l], (-term.steep).mul_add(last.im[l], xi));
+        (to_chain.re[l], to_chain.im[l]) = (cr, ci);
+        to.re[l] = xr.mul_add(cr, -(xi * ci));
+        to.im[l] = xr.mul_add(ci, xi * cr);
+        // What the node after is taken times: steep + i drift.
+        slope.re[l] = cr.mul_add(term.steep, -(ci * drift));
+        slope.im[l] = cr.mul_add(drift, ci * term.steep);
+    }
+    (site.part, site.known, site.slope) = (part, to, slope);
+    (to_chain, to)
+}
+
+/// The unknown at a node, given that of the node after; and the step of the waves there.
+#[inline(always)]
+fn substitute(site: &mut Site, node: &Node, term: &Term, after: &Complex) -> Complex {
+    let (known, slope) = (site.known, site.slope);
+    let mut to = Complex::ZERO;
+    for l in 0..LANES {
+        let (ar, ai) = (after.re[l], after.im[l]);
+        to.re[l] = slope.im[l].mul_add(ai, (-slope.re[l]).mul_add(ar, known.re[l]));
+        to.im[l] = (-slope.im[l]).mul_add(ar, (-slope.re[l]).mul_add(ai, known.im[l]));
+    }
+    turn(site, node, term, &to);
+    to
+}
+
+/// u' = u + 2 d p (i u − y) / q⁻.
+#[inline(always)]
+fn turn(site: &mut Site, node: &Node, term: &Term, y: &Complex) {
+    let (p, part, u) = (site.p, site.part, site.u);
+    let damping = term.damping(node);
+    let mut to = Complex::ZERO;
+    for l in 0..LANES {
+        let i = term.d.mul_add(p.0[l], damping);
+        let size = 2.0 * term.d * p.0[l] * part.0[l];
+        let (re, im) = (size * term.b, size * i);
+        let (er, ei) = (-u.im[l] - y.re[l], u.re[l] - y.im[l]);
+        to.re[l] = (-im).mul_add(ei, re.mul_add(er, u.re[l]));
+        to.im[l] = im.mul_add(er, re.mul_add(ei, u.im[l]));
+    }
+    site.u = to;
+}
+
+/// i u: the unknown where waves do not change.
+#[inline(always)]
+fn unchanged(site: &Site) -> Complex {
+    let mut to = Complex::ZERO;
+    for l in 0..LANES {
+        (to.re[l], to.im[l]) = (-site.u.im[l], site.u.re[l]);
+    }
+    to
+}
+
+/// One term of a step, for waves that stay as they are at both ends: (D + Z) y = i D u, from both ends to the middle and back.
+#[inline(always)]
+fn solve(sites: &mut [Site], row: &[Node], term: &Term, drift: &Lanes) {
+    let ([first, sites @ .., end], [_, row @ .., _]) = (sites, row) else { return };
+    let mut opposite = Lanes::ZERO;
+    for l in 0..LANES {
+        opposite.0[l] = -drift.0[l];
+    }
+    let half = sites.len() / 2;
+    let (left, right) = sites.split_at_mut(half);
+    let (left_row, right_row) = row.split_at(half);
+    let ([middle, right @ ..], [middle_node, right_row @ ..]) = (right, right_row) else { return };
+    let (mut up, mut down) = ((Complex::ZERO, unchanged(first)), (Complex::ZERO, unchanged(end)));
+    // The left part may be the longer one, by one.
+    let more = left.len() - right.len();
+    if more > 0 {
+        up = eliminate(&mut left[0], &left_row[0], term, drift, &up);
+    }
+    let both = left[more..].iter_mut().zip(&left_row[more..]).zip(right.iter_mut().zip(right_row).rev());
+    for ((a, a_node), (b, b_node)) in both {
+        up = eliminate(a, a_node, term, drift, &up);
+        down = eliminate(b, b_node, term, &opposite, &down);
+    }
+    // In the middle the two meet.
+    let (own, part) = diagonal(middle, term, term.damping(middle_node));
+    let mut y = Complex::ZERO;
+    for l in 0..LANES {
+        let (zz, drift) = (term.zz.0[l], drift.0[l]);
+        let re = own.re[l] - 2.0 * term.steep - zz * (up.0.re[l] + down.0.re[l]);
+        let im = own.im[l] - zz * (up.0.im[l] + down.0.im[l]);
+        let over = 1.0 / re.mul_add(re, im * im);
+        let (cr, ci) = (re * over, -(im * over));
+        let (ur, ui) = (middle.u.re[l], middle.u.im[l]);
+        let (sr, si) = (up.1.re[l] + down.1.re[l], up.1.im[l] + down.1.im[l]);
+        let (tr, ti) = (down.1.re[l] - up.1.re[l], down.1.im[l] - up.1.im[l]);
+        let xr = -own.re[l].mul_add(ui, own.im[l] * ur) - term.steep * sr + drift * ti;
+        let xi = own.re[l].mul_add(ur, -(own.im[l] * ui)) - term.steep * si - drift * tr;
+        y.re[l] = xr.mul_add(cr, -(xi * ci));
+        y.im[l] = xr.mul_add(ci, xi * cr);
+    }
+    middle.part = part;
+    turn(middle, middle_node, term, &y);
+    let (mut up, mut down) = (y, y);
+    let both = left[more..].iter_mut().zip(&left_row[more..]).rev().zip(right.iter_mut().zip(right_row));
+    for ((a, a_node), (b, b_node)) in both {
+        up = substitute(a, a_node, term, &up);
+        down = substitute(b, b_node, term, &down);
+    }
+    if more > 0 {
+        substitute(&mut left[0], &left_row[0], term, &up);
+    }
+}
+
+/// How many nodes inland what is solved for is followed, where nothing of it is left.
+const INLAND: usize = 16;
+
+/// The next stretch of a row, from a node on, that has water or is near some.
+#[inline(always)]
+fn stretch(row: &[Node], from: usize) -> Option<(usize, usize)> {
+    let first = from + row[from..].iter().position(|node| node.near <= 1.0)?;
+    let mut last = first;
+    for (j, node) in row.iter().enumerate().skip(first) {
+        if node.near <= 1.0 {
+            last = j;
+        } else if j > last + 2 * INLAND {
+            break;
+        }
+    }
+    Some((first.saturating_sub(INLAND).max(from), (last + INLAND + 1).min(row.len())))
+}
+
 /// Takes the waves of a row to the next one, `forward` (m) on; nodes are `apart` (m). `row` holds the nodes midway.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f32, apart: f32) {
+    step(march, waves, row, forward, apart);
+}
+
+#[inline(always)]
+fn step(march: &mut March, waves: &Waves, row: &[Node], forward: f32, apart: f32) {
     let n = row.len();
-    let (b, p, v) = (&mut march.b[..n], &mut march.p[..n], &mut march.v[..n]);
-    let (g, inverse) = (&mut march.g[..n], &mut march.inverse[..n]);
-    let (part, root) = (&mut march.part[..n], &mut march.root[..n]);
     let steep = 1.0 / (apart * apart);
-    let (across, finest) = (waves.across, waves.finest);
-    let mut drift = Lanes::ZERO;
+    let (mut drift, mut zz) = (Lanes::ZERO, Lanes::ZERO);
     for l in 0..LANES {
-        drift.0[l] = across.0[l] / apart;
+        let across = waves.across.0[l] / apart;
+        (drift.0[l], zz.0[l]) = (across, steep.mul_add(steep, across * across));
     }
-    for j in 0..n {
-        let (index, f) = entry(row[j].s);
-        let (low, high) = (&waves.table[index], &waves.table[index + 1]);
-        let over = 1.0 / row[j].s;
-        // Copies, here and below, let the compiler see that nothing overlaps.
-        let (low, high, from) = (low[0], high[0], b[j]);
-        let (mut to_p, mut to_root, mut to_v) = (Lanes::ZERO, Lanes::ZERO, Complex::ZERO);
-        for l in 0..LANES {
-            let k = (f.mul_add(high.0[l] - low.0[l], low.0[l]) * over).min(finest.0[l]);
-            let q = across.0[l];
-            let along = k.mul_add(k, -(q * q)).max(0.02 * k * k).sqrt();
-            to_p.0[l] = along;
-            let power = along * along.sqrt();
-            to_root.0[l] = power;
-            let weight = 1.0 / power;
-            to_v.re[l] = from.re[l] * weight;
-            to_v.im[l] = from.im[l] * weight;
+    let mut from = 0;
+    // Land is left out: nothing runs there, and what is left of the unknowns would be too small for quick arithmetic.
+    while let Some((first, end)) = stretch(row, from) {
+        let (b, sites, row) = (&mut march.b[first..end], &mut march.sites[first..end], &row[first..end]);
+        prepare(b, sites, row, waves);
+        for (a, b, least) in TERMS {
+            solve(sites, row, &Term { b, square: b * b, d: 0.5 * a * forward, least, steep, zz }, &drift);
         }
-        (p[j], root[j], v[j]) = (to_p, to_root, to_v);
+        finish(b, sites, row, waves, forward);
+        from = end;
     }
-    for (a, bn, least) in TERMS {
-        let d = 0.5 * a * forward;
-        // Right-hand side: p²v + Z (q⁺ v), with Z the second difference and the drift across.
-        // Forward elimination; at the ends are the waves of the open sea, which do not change.
-        let mut last = Complex::ZERO;
-        let mut chain = Complex::ZERO;
-        let ends = [0, n - 1].map(|j| {
-            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            weighed(&p[j], &v[j], bn, -d, damping)
-        });
-        last = if n > 1 { ends[0] } else { last };
-        // q⁺ v of the nodes before, here and after: in a loop of its own the compiler would take nodes for lanes, by gathers.
-        let ahead = |j: usize| {
-            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            weighed(&p[j], &v[j], bn, d, damping)
-        };
-        let mut before = ahead(0);
-        let mut here = ahead(1.min(n - 1));
-        for j in 1..n - 1 {
-            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            let after = ahead(j + 1);
-            let (pj, vj) = (p[j], v[j]);
-            let (mut to_chain, mut to, mut to_part) = (Complex::ZERO, Complex::ZERO, Lanes::ZERO);
-            for l in 0..LANES {
-                let drift = drift.0[l];
-                let square = pj.0[l] * pj.0[l];
-                // z± = steep ± i drift
-                let (sr, si) = (before.re[l] + after.re[l], before.im[l] + after.im[l]);
-                let (tr, ti) = (after.re[l] - before.re[l], after.im[l] - before.im[l]);
-                let right_re = steep.mul_add(sr - 2.0 * here.re[l], square.mul_add(vj.re[l], -(drift * ti)));
-                let right_im = steep.mul_add(si - 2.0 * here.im[l], square.mul_add(vj.im[l], drift * tr));
-                // Diagonal: p²/q⁻ − 2 steep, q⁻ = bₙ − i (δ + d p).
-                let i = -d.mul_add(pj.0[l], damping);
-                let part = 1.0 / bn.mul_add(bn, i * i);
-                to_part.0[l] = part;
-                let size = square * part;
-                let zz = steep.mul_add(steep, drift * drift);
-                let den_re = size.mul_add(bn, -2.0 * steep) - zz * chain.re[l];
-                let den_im = -(size * i) - zz * chain.im[l];
-                let over = 1.0 / den_re.mul_add(den_re, den_im * den_im);
-                let (cr, ci) = (den_re * over, -(den_im * over));
-                to_chain.re[l] = cr;
-                to_chain.im[l] = ci;
-                // (right − z⁻ last) chain
-                let xr = right_re - steep.mul_add(last.re[l], drift * last.im[l]);
-                let xi = right_im - steep.mul_add(last.im[l], -(drift * last.re[l]));
-                to.re[l] = xr.mul_add(cr, -(xi * ci));
-                to.im[l] = xr.mul_add(ci, xi * cr);
-            }
-            (chain, last, before, here) = (to_chain, to, here, after);
-            inverse[j] = chain;
-            part[j] = to_part;
-            g[j] = last;
-        }
-        // Back substitution, and v from what was solved for.
-        let mut next = ends[1];
-        for j in (1..n - 1).rev() {
-            let damping = row[j].near.min(1.0).mul_add(BESIDE_LAND, least);
-            let (inverse, gj, pj, part) = (inverse[j], g[j], p[j], part[j]);
-            let (mut to, mut to_v) = (Complex::ZERO, Complex::ZERO);
-            for l in 0..LANES {
-                let drift = drift.0[l];
-                let (cr, ci) = (inverse.re[l], inverse.im[l]);
-                let yr = steep.mul_add(next.re[l], -(drift * next.im[l]));
-                let yi = steep.mul_add(next.im[l], drift * next.re[l]);
-                let xr = gj.re[l] - yr.mul_add(cr, -(yi * ci));
-                let xi = gj.im[l] - yr.mul_add(ci, yi * cr);
-                to.re[l] = xr;
-                to.im[l] = xi;
-                let i = -d.mul_add(pj.0[l], damping);
-                to_v.re[l] = xr.mul_add(bn, xi * i) * part.0[l];
-                to_v.im[l] = xi.mul_add(bn, -(xr * i)) * part.0[l];
-            }
-            (next, v[j]) = (to, to_v);
-        }
-    }
-    for j in 0..n {
-        let land = row[j].near > 1.0;
-        let keep = if land { 0.0 } else { 1.0 - row[j].draw };
-        let gain = if land { 0.0 } else { row[j].draw };
-        let end = j == 0 || j == n - 1;
-        if end {
-            b[j] = Complex::ONE;
-            continue;
-        }
-        let (pj, vj, power, open) = (p[j], v[j], root[j], waves.along);
-        let mut to = Complex::ZERO;
-        for l in 0..LANES {
-            let along = pj.0[l];
-            let weight = power.0[l] * keep;
-            let turns = (along - open.0[l]) * forward * 0.159_154_94;
-            let (s, c) = sine_cosine(turns);
-            let (re, im) = (vj.re[l] * weight, vj.im[l] * weight);
-            to.re[l] = re.mul_add(c, -(im * s)) + gain;
-            to.im[l] = re.mul_add(s, im * c);
-        }
-        b[j] = to;
-    }
+    (march.b[0], march.b[n - 1]) = (Complex::ONE, Complex::ONE);
     // What has not broken spreads a little, as the waves do.
     let whole = &mut march.whole[..n];
     let mut before = whole[0];
@@ -379,5 +456,91 @@ pub(super) fn advance(march: &mut March, waves: &Waves, row: &[Node], forward: f
         let mixed = 0.25 * (before + 2.0 * here + whole[j + 1]);
         whole[j] = mixed + (1.0 - mixed) * row[j].draw;
         before = here;
+    }
+}
+
+/// p and u from the tables and b.
+#[inline(always)]
+fn prepare(b: &[Complex], sites: &mut [Site], row: &[Node], waves: &Waves) {
+    for ((node, from), site) in row.iter().zip(b).zip(sites) {
+        let (index, f) = entry(node.s);
+        let over = 1.0 / node.s;
+        // Copies, here and elsewhere, let the compiler see that nothing overlaps.
+        let ([low, low_power, _], [high, high_power, _]) = (waves.table[index], waves.table[index + 1]);
+        let from = *from;
+        let (mut p, mut root, mut u) = (Lanes::ZERO, Lanes::ZERO, Complex::ZERO);
+        for l in 0..LANES {
+            let along = f.mul_add(high.0[l] - low.0[l], low.0[l]) * over;
+            // One step of Newton's method makes p^−½ of the table's exact.
+            let guess = f.mul_add(high_power.0[l] - low_power.0[l], low_power.0[l]);
+            let off = (-along).mul_add(guess * guess, 1.0);
+            let power = (0.5 * off).mul_add(guess, guess);
+            (p.0[l], root.0[l]) = (along, along * power);
+            (u.re[l], u.im[l]) = (from.re[l] * power, from.im[l] * power);
+        }
+        (site.p, site.root, site.u) = (p, root, u);
+    }
+}
+
+/// b after the step, from u.
+#[inline(always)]
+fn finish(b: &mut [Complex], sites: &[Site], row: &[Node], waves: &Waves, forward: f32) {
+    let open = waves.along;
+    for ((node, site), b) in row.iter().zip(sites).zip(b) {
+        let land = node.near > 1.0;
+        let keep = if land { 0.0 } else { 1.0 - node.draw };
+        let gain = if land { 0.0 } else { node.draw };
+        let (p, root, u) = (site.p, site.root, site.u);
+        let mut to = Complex::ZERO;
+        for l in 0..LANES {
+            let weight = root.0[l] * keep;
+            let turns = (p.0[l] - open.0[l]) * forward * 0.159_154_94;
+            let (s, c) = sine_cosine(turns);
+            let (re, im) = (u.re[l] * weight, u.im[l] * weight);
+            to.re[l] = re.mul_add(c, -(im * s)) + gain;
+            to.im[l] = re.mul_add(s, im * c);
+        }
+        *b = to;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wide_and_plain_arithmetic_give_the_same_bits() {
+        let mut waves = Waves::new();
+        for (i, entry) in waves.table.iter_mut().enumerate() {
+            for l in 0..LANES {
+                let s = (i as f32 / STEPS as f32).max(1e-3);
+                let p = 0.05 + 0.01 * l as f32 + 0.1 / s;
+                (entry[0].0[l], entry[1].0[l]) = (p * s, 1.0 / p.sqrt());
+                waves.across.0[l] = 0.01 * l as f32;
+                waves.along.0[l] = 0.05 + 0.01 * l as f32;
+            }
+        }
+        // Open water, a bank, land of more than twice what is followed inland, a strip of land, and each length of a stretch's remainder.
+        for nodes in [2, 3, 4, 60, 61, 120] {
+            let row: Vec<Node> = (0..nodes)
+                .map(|j| Node {
+                    s: 0.4 + 0.3 * (j as f32 * 0.2).sin(),
+                    near: if (65..105).contains(&j) || j == 20 { 2.0 } else { 0.3 * (j % 3) as f32 },
+                    draw: if j < 4 { 0.1 } else { 0.0 },
+                    ..Node::default()
+                })
+                .collect();
+            let (mut wide, mut plain) = (March::default(), March::default());
+            wide.start(nodes);
+            plain.start(nodes);
+            for _ in 0..20 {
+                advance(&mut wide, &waves, &row, 3.0, 4.0);
+                step(&mut plain, &waves, &row, 3.0, 4.0);
+            }
+            assert_eq!((&wide.b, &wide.whole), (&plain.b, &plain.whole));
+            let energy = |b: &Complex| b.re[3].mul_add(b.re[3], b.im[3] * b.im[3]);
+            assert!(wide.b.iter().all(|b| energy(b) < 10.0 && b.im[7].is_finite()));
+            assert!(nodes < 60 || (wide.b[20] == Complex::ZERO && energy(&wide.b[40]) > 0.1));
+        }
     }
 }

@@ -38,80 +38,102 @@ pub(super) fn measure(sea: &mut ShoreSea) {
     let none = Most { bounds: Bounds::default(), by_length: vec![[0.0; BINS]; sea.components.len()] };
     // One more cell at every side, the open sea's.
     let (columns, rows) = (sea.columns + 1, sea.rows + 1);
-    let mut steepness = std::mem::take(&mut sea.steepness);
-    steepness.resize(columns * rows, 0.0);
-    steepness.par_chunks_exact_mut(columns).enumerate().for_each(|(row, out)| steepnesses(sea, row, out));
-    tame(sea, &steepness);
+    let mut cells = std::mem::take(&mut sea.cells);
+    cells.resize(columns * rows, [0.0; 3]);
+    let empty = || (none.clone(), vec![Lengths::NONE; sea.blocks]);
+    let (most, _) = cells
+        .par_chunks_exact_mut(columns)
+        .enumerate()
+        .fold(empty, |(mut most, mut lengths), (row, out)| {
+            sums(sea, row, out, &mut lengths, &mut most.by_length);
+            (most, lengths)
+        })
+        .reduce(empty, |(a, lengths), (b, _)| (a.join(b), lengths));
+    sea.by_length = most.by_length;
+    tame(sea, &cells);
     sea.places[(columns - 1) * (rows - 1)] = sea.open;
-    sea.steepness = steepness;
-    let most = (0..rows)
-        .into_par_iter()
+    let most = cells
+        .par_chunks_exact(columns)
+        .enumerate()
         .fold(
             || none.clone(),
-            |mut most, row| {
-                cells(sea, row, &mut most);
+            |mut most, (row, cells)| {
+                for (column, cell) in cells.iter().enumerate() {
+                    bound(sea, corners(sea, column, row), *cell, &mut most.bounds);
+                }
                 most
             },
         )
         .reduce(|| none.clone(), Most::join);
-    (sea.bounds, sea.by_length) = (most.bounds, most.by_length);
+    sea.bounds = most.bounds;
+    sea.cells = cells;
 }
 
 /// Lowers the sideways motion at the corners of cells that are too steep, and towards them no faster than is smooth.
-fn tame(sea: &mut ShoreSea, steepness: &[f32]) {
+fn tame(sea: &mut ShoreSea, cells: &[[f32; 3]]) {
     let (columns, rows) = (sea.columns, sea.rows);
     let height: f32 = sea.components.iter().map(|c| c.amplitude).sum();
     let n = Place::SIDEWAYS;
     let wide = columns + 1;
-    for i in 0..columns * rows {
-        let (c, r) = (i % columns, i / columns);
-        let around = [(c, r), (c + 1, r), (c, r + 1), (c + 1, r + 1)].map(|(c, r)| steepness[r * wide + c]);
-        let steepest = around.into_iter().fold(0.0, f32::max);
-        let most = STRETCH / steepest.max(STRETCH);
-        sea.places[i].0[n] = sea.places[i].0[n].min(most);
-    }
+    let slope = |c: usize, r: usize| cells[r * wide + c][1];
     // The open sea's is the least of all along the rim, so that there is no step.
-    let rim = steepness[0].max(steepness[wide * (rows + 1) - 1]);
-    sea.open.0[n] = sea.open.0[n].min(STRETCH / rim.max(STRETCH));
-    let (slow_x, slow_y) = {
-        let most = 0.04 / height.max(0.04);
-        (most * sea.spacing.x as f32, most * sea.spacing.y as f32)
-    };
-    let edge = |c: usize, r: usize| c == 0 || r == 0 || c == columns - 1 || r == rows - 1;
-    // The second time from the rim, where it is made the open sea's all round.
-    for _ in 0..2 {
-        let lowest = |open: f32, i: usize| {
-            if edge(i % columns, i / columns) { open.min(sea.places[i].0[n]) } else { open }
+    let rim = slope(0, 0).max(slope(columns, rows));
+    let mut open = sea.open.0[n].min(STRETCH / rim.max(STRETCH));
+    let mut held = std::mem::take(&mut sea.held);
+    held.clear();
+    for r in 0..rows {
+        held.extend(sea.places[r * columns..][..columns].iter().enumerate().map(|(c, place)| {
+            let steepest = slope(c, r).max(slope(c + 1, r)).max(slope(c, r + 1)).max(slope(c + 1, r + 1));
+            place.0[n].min(STRETCH / steepest.max(STRETCH))
+        }));
+    }
+    let slow = sea.spacing.as_vec2() * (0.04 / height.max(0.04));
+    let edges = |held: &mut [f32], open: f32| {
+        let rim = |row: &mut [f32]| {
+            row.iter_mut().fold(open, |least, held| {
+                *held = held.min(open);
+                least.min(*held)
+            })
         };
-        let open = (0..columns * rows).fold(sea.open.0[n], lowest);
-        sea.open.0[n] = open;
-        for backward in [false, true] {
-            for step in 0..columns * rows {
-                let i = if backward { columns * rows - 1 - step } else { step };
-                let (c, r) = (i % columns, i / columns);
-                let mut most = sea.places[i].0[n];
-                if edge(c, r) {
-                    most = most.min(open);
-                }
-                if backward {
-                    if c + 1 < columns {
-                        most = most.min(sea.places[i + 1].0[n] + slow_x);
-                    }
-                    if r + 1 < rows {
-                        most = most.min(sea.places[i + columns].0[n] + slow_y);
-                    }
-                } else {
-                    if c > 0 {
-                        most = most.min(sea.places[i - 1].0[n] + slow_x);
-                    }
-                    if r > 0 {
-                        most = most.min(sea.places[i - columns].0[n] + slow_y);
-                    }
-                }
-                sea.places[i].0[n] = most;
+        let mut least = rim(&mut held[..columns]).min(rim(&mut held[(rows - 1) * columns..]));
+        for row in held.chunks_exact_mut(columns) {
+            for c in [0, columns - 1] {
+                row[c] = row[c].min(open);
+                least = least.min(row[c]);
             }
         }
+        least
+    };
+    // The second time from the rim, where it is made the open sea's all round.
+    for _ in 0..2 {
+        open = edges(&mut held, open);
+        edges(&mut held, open);
+        for r in 0..rows {
+            let (before, row) = held.split_at_mut(r * columns);
+            let row = &mut row[..columns];
+            if r > 0 {
+                let below = &before[(r - 1) * columns..];
+                row.iter_mut().zip(below).for_each(|(held, below)| *held = held.min(below + slow.y));
+            }
+            row.iter_mut().fold(f32::INFINITY, |last, held| {
+                *held = held.min(last + slow.x);
+                *held
+            });
+        }
+        for r in (0..rows).rev() {
+            let (row, after) = held[r * columns..].split_at_mut(columns);
+            if r + 1 < rows {
+                row.iter_mut().zip(after).for_each(|(held, above)| *held = held.min(*above + slow.y));
+            }
+            row.iter_mut().rev().fold(f32::INFINITY, |last, held| {
+                *held = held.min(last + slow.x);
+                *held
+            });
+        }
     }
+    sea.open.0[n] = open;
+    sea.places.iter_mut().zip(&held).for_each(|(place, held)| place.0[n] = *held);
+    sea.held = held;
 }
 
 /// Indices of the corners of a cell, where they are on the grid; cells are counted from the one before the first node.
@@ -123,77 +145,78 @@ fn corners(sea: &ShoreSea, column: usize, row: usize) -> [Option<usize>; 4] {
     })
 }
 
-/// Sums over the waves of what they can be in a cell at most: height, slope, curvature; handing each wave's to `each`.
-#[inline(always)]
-fn sums(
-    sea: &ShoreSea,
-    corners: [Option<usize>; 4],
-    mut each: impl FnMut(usize, &[f32; LANES], &[f32; LANES]),
-) -> [f32; 3] {
+/// The octaves of wavelengths that sixteen waves were last seen in, and how high each has been since it came into its own.
+#[derive(Clone, Copy)]
+struct Lengths {
+    octave: [i32; LANES],
+    highest: [f32; LANES],
+}
+
+impl Lengths {
+    const NONE: Lengths = Lengths { octave: [0; LANES], highest: [0.0; LANES] };
+
+    fn note(&self, by_length: &mut [[f32; BINS]]) {
+        for (l, bins) in by_length.iter_mut().take(LANES).enumerate() {
+            let seen = &mut bins[self.octave[l] as usize];
+            *seen = seen.max(self.highest[l]);
+        }
+    }
+}
+
+/// Sums over the waves of what they can be in the cells of a row at most: height, slope, curvature.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn sums(sea: &ShoreSea, row: usize, out: &mut [[f32; 3]], lengths: &mut [Lengths], by_length: &mut [[f32; BINS]]) {
     let (over_x, over_y) = ((1.0 / sea.spacing.x) as f32, (1.0 / sea.spacing.y) as f32);
     let open = Record::OPEN;
-    let mut all = [0.0f32; 3];
-    for (block, waves) in sea.lanes.iter().enumerate() {
-        let [a, b, d, e] = corners.map(|i| *i.map_or(&open, |i| &sea.records[i * sea.blocks + block]));
-        let (mut heights, mut slopes, mut curvatures) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
-        let mut numbers = [0.0f32; LANES];
-        for l in 0..LANES {
-            let [pa, pb, pd, pe] = [a.phase[l], b.phase[l], d.phase[l], e.phase[l]];
-            let [aa, ab, ad, ae] = [a.amplitude[l], b.amplitude[l], d.amplitude[l], e.amplitude[l]];
-            let turn = |from: i16, to: i16| f32::from(to.wrapping_sub(from)) * (1.0 / 65_536.0);
-            // Beside a cell's first edge the phase may go round the other way; the kernel takes the one from the first corner.
-            let greatest = |p: f32, q: f32, open: f32| (open + p).abs().max((open + q).abs()) * TAU;
-            let kx = greatest(turn(pa, pb), turn(pd, pe), waves.step_x[l]) * over_x;
-            let twist = turn(pd, pe) - turn(pa, pb);
-            let ky = greatest(turn(pa, pd), turn(pa, pd) + twist, waves.step_y[l]) * over_y;
-            let square = kx * kx + ky * ky;
-            let k = square.sqrt();
-            let unit = waves.unit[l];
-            let amplitude = f32::from(aa.max(ab).max(ad).max(ae)) * unit;
-            let fall = |p: u16, q: u16| (f32::from(p) - f32::from(q)).abs() * unit;
-            let changes = fall(aa, ab).max(fall(ad, ae)) * over_x + fall(aa, ad).max(fall(ab, ae)) * over_y;
-            heights[l] = amplitude;
-            slopes[l] = amplitude * k + changes;
-            curvatures[l] = amplitude * square + 2.0 * changes * k;
-            numbers[l] = k;
-        }
-        all[0] += sum(&heights);
-        all[1] += sum(&slopes);
-        all[2] += sum(&curvatures);
-        each(block, &heights, &numbers);
-    }
-    all
-}
-
-/// Sums of slopes over a row of cells.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn steepnesses(sea: &ShoreSea, row: usize, out: &mut [f32]) {
     for (column, out) in out.iter_mut().enumerate() {
-        *out = sums(sea, corners(sea, column, row), |_, _, _| {})[1];
-    }
-}
-
-/// A row of cells.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn cells(sea: &ShoreSea, row: usize, most: &mut Most) {
-    for column in 0..sea.columns + 1 {
-        let at = corners(sea, column, row);
-        let by_length = &mut most.by_length;
-        let [height, slope, curvature] = sums(sea, at, |block, heights, numbers| {
-            let first = block * LANES;
-            let last = (first + LANES).min(by_length.len());
-            for (l, bins) in by_length[first..last].iter_mut().enumerate() {
-                let seen = &mut bins[octave(TAU / numbers[l].max(1e-6))];
-                *seen = seen.max(heights[l]);
+        let corners = corners(sea, column, row);
+        *out = [0.0; 3];
+        for (block, (waves, seen)) in sea.lanes.iter().zip(&mut *lengths).enumerate() {
+            let [a, b, d, e] = corners.map(|i| *i.map_or(&open, |i| &sea.records[i * sea.blocks + block]));
+            let (mut heights, mut slopes, mut curvatures) = ([0.0f32; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+            let (mut octaves, mut highest, mut others) = ([0i32; LANES], seen.highest, 0);
+            for l in 0..LANES {
+                let [pa, pb, pd, pe] = [a.phase[l], b.phase[l], d.phase[l], e.phase[l]];
+                let [aa, ab, ad, ae] = [a.amplitude[l], b.amplitude[l], d.amplitude[l], e.amplitude[l]];
+                let turn = |from: i16, to: i16| f32::from(to.wrapping_sub(from)) * (1.0 / 65_536.0);
+                // Beside a cell's first edge the phase may go round the other way; the kernel takes the one from the first corner.
+                let greatest = |p: f32, q: f32, open: f32| (open + p).abs().max((open + q).abs()) * TAU;
+                let (first, second, up) = (turn(pa, pb), turn(pd, pe), turn(pa, pd));
+                let kx = greatest(first, second, waves.step_x[l]) * over_x;
+                let ky = greatest(up, up + (second - first), waves.step_y[l]) * over_y;
+                let square = kx * kx + ky * ky;
+                let k = square.sqrt();
+                let unit = waves.unit[l];
+                let amplitude = f32::from(aa.max(ab).max(ad).max(ae)) * unit;
+                let fall_x = f32::from(aa.abs_diff(ab).max(ad.abs_diff(ae)));
+                let fall_y = f32::from(aa.abs_diff(ad).max(ab.abs_diff(ae)));
+                let changes = (fall_x * over_x + fall_y * over_y) * unit;
+                heights[l] = amplitude;
+                slopes[l] = amplitude * k + changes;
+                curvatures[l] = amplitude * square + 2.0 * changes * k;
+                octaves[l] = octave(TAU / k.max(1e-6)) as i32;
+                highest[l] = highest[l].max(amplitude);
+                others |= octaves[l] ^ seen.octave[l];
             }
-        });
-        cell(sea, at, [height, slope, curvature], &mut most.bounds);
+            *out = [out[0] + sum(&heights), out[1] + sum(&slopes), out[2] + sum(&curvatures)];
+            if others == 0 {
+                seen.highest = highest;
+            } else {
+                // Seldom: waves keep their lengths from cell to cell.
+                seen.note(&mut by_length[block * LANES..]);
+                *seen = Lengths { octave: octaves, highest: heights };
+            }
+        }
+    }
+    for (block, seen) in lengths.iter_mut().enumerate() {
+        seen.note(&mut by_length[block * LANES..]);
+        *seen = Lengths::NONE;
     }
 }
 
 /// Bounds of a cell, from what the waves can be there.
 #[inline(always)]
-fn cell(sea: &ShoreSea, corners: [Option<usize>; 4], [height, slope, curvature]: [f32; 3], b: &mut Bounds) {
+fn bound(sea: &ShoreSea, corners: [Option<usize>; 4], [height, slope, curvature]: [f32; 3], b: &mut Bounds) {
     let (dx, dy) = (sea.spacing.x as f32, sea.spacing.y as f32);
     let places = corners.map(|i| i.map_or(&sea.open, |i| &sea.places[i]));
     let greatest = |n: usize| places.iter().map(|p| p.0[n]).fold(0.0, f32::max);

@@ -6,9 +6,10 @@
 
 use super::super::{OutOfRange, PlaneWave, StillWater};
 use super::bed::Bed;
-use super::lanes::{Complex, LANES};
-use super::march::{self, March, Node, Record, STEPS, Told, Waves};
+use super::lanes::{Complex, LANES, smooth};
+use super::march::{self, March, Node, STEPS, Told, Waves};
 use super::{Cancelled, Settings, ShoreError};
+use crate::memory;
 use glam::DVec2;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -49,6 +50,8 @@ pub(super) struct Grid {
     pub(super) near: Vec<f32>,
     /// Slope of the bed (m per m), over some nodes.
     pub(super) slope: Vec<f32>,
+    /// Most energy (m²) that the depth bears: where Hs = 4 √m₀ is the breaking index times it. Endless off the bed.
+    pub(super) cap: Vec<f32>,
 }
 
 /// Everything that a solution needs and that the next one can use again.
@@ -70,8 +73,9 @@ pub(super) struct Batch {
     march: March,
     nodes: Vec<Node>,
     /// How far out in the apron a node across the march is.
-    sides: Vec<f64>,
-    pub(super) records: Vec<Record>,
+    sides: Vec<f32>,
+    /// What is told of each member at each node, as in [`March::records`].
+    pub(super) records: Vec<u32>,
     pub(super) told: Vec<Told>,
     /// Energy (m²) of the other batches, told by the march before.
     before: Vec<f32>,
@@ -132,6 +136,11 @@ impl Grid {
             let w = w * w * (3.0 - 2.0 * w);
             *s = if w >= 1.0 { rim } else { inner + (rim - inner) * w as f32 };
         }
+        self.cap.clear();
+        self.cap.extend(self.s.iter().map(|&s| {
+            let height = settings.breaking * stretch(s) as f32;
+            if s >= rim - 1e-3 { f32::INFINITY } else { (0.25 * height) * (0.25 * height) }
+        }));
 
         // Where land is near.
         a.clear();
@@ -218,6 +227,14 @@ fn blur(values: &mut [f32], other: &mut Vec<f32>, columns: usize, rows: usize, r
     }
 }
 
+/// Makes a list so long, in new memory of large pages if it must grow.
+pub(super) fn resize<T: Clone>(list: &mut Vec<T>, length: usize, value: T) {
+    if list.capacity() < length {
+        *list = memory::in_large_pages(Vec::with_capacity(length));
+    }
+    list.resize(length, value);
+}
+
 /// How far a solution has come, and whether to go on.
 struct Progress<'a> {
     done: AtomicUsize,
@@ -260,7 +277,6 @@ pub(super) fn solve(
     let progress = Progress { done: AtomicUsize::new(0), all: 2 * rows, stopped: AtomicBool::new(false), tell };
     let whole: f64 = waves.iter().map(|w| w.amplitude * w.amplitude).sum();
     let alone = batches.len() < 2;
-    let rim = squeeze(depth);
     let grid = &*grid;
     // First all batches as if the others broke as they do, then with what the others came to.
     for pass in 0..2 {
@@ -269,22 +285,19 @@ pub(super) fn solve(
             .map(|batch| {
                 let own: f64 = batch.members.iter().map(|&i| waves[i].amplitude * waves[i].amplitude).sum();
                 let share = if pass == 0 { whole / own.max(1e-300) } else { 1.0 };
-                batch.walk(grid, share as f32, rim, settings, &progress)
+                batch.walk(grid, share as f32, alone, &progress)
             })
             .reduce(|| true, |a, b| a && b);
         if !went {
             return Err(Cancelled.into());
         }
-        if alone || pass == 1 {
+        if alone || pass == 1 || batches.iter().all(|batch| batch.kept.is_none()) {
             break;
         }
         let count = grid.columns * grid.rows;
-        let cap = |i: usize| limit(grid.s[i], rim, settings);
-        let mut broken = false;
         for i in 0..count {
             let total: f32 = batches.iter().map(|b| b.told[i].energy).sum();
-            if total > 0.97 * cap(i) {
-                broken = true;
+            if total > 0.97 * grid.cap[i] {
                 for batch in batches.iter_mut() {
                     let first = batch.kept.unwrap_or(0);
                     let (column, row) = (i % grid.columns, i / grid.columns);
@@ -297,15 +310,12 @@ pub(super) fn solve(
                 }
             }
         }
-        if !broken {
-            break;
-        }
         for b in 0..batches.len() {
             let mut before = std::mem::take(&mut batches[b].before);
             before.clear();
             before.extend((0..count).map(|i| {
                 let total: f32 = batches.iter().map(|b| b.told[i].energy).sum();
-                let lower = (cap(i) / total.max(1e-30)).min(1.0);
+                let lower = (grid.cap[i] / total.max(1e-30)).min(1.0);
                 (total - batches[b].told[i].energy).max(0.0) * lower
             }));
             batches[b].before = before;
@@ -313,15 +323,6 @@ pub(super) fn solve(
     }
     (tell)(1.0);
     Ok(())
-}
-
-/// Most energy (m²) that a depth bears: where Hs = 4 √m₀ is the breaking index times it. Endless off the bed.
-pub(super) fn limit(s: f32, rim: f32, settings: &Settings) -> f32 {
-    if s >= rim - 1e-3 {
-        return f32::INFINITY;
-    }
-    let height = settings.breaking * stretch(s) as f32;
-    (0.25 * height) * (0.25 * height)
 }
 
 fn check(waves: &[PlaneWave], depth: f64, settings: &Settings) -> Result<(), OutOfRange> {
@@ -383,44 +384,44 @@ fn gather(batches: &mut Vec<Batch>, waves: &[PlaneWave], depth: f64, grid: &Grid
 impl Waves {
     fn prepare(&mut self, waves: &[PlaneWave], members: &[usize], depth: f64, grid: &Grid, axis: usize) {
         let water = StillWater { depth, ..StillWater::DEEP };
-        for l in 0..LANES {
-            // Idle lanes carry the first wave without energy.
-            let wave = &waves[members[l.min(members.len() - 1)]];
-            let idle = l >= members.len();
+        for (l, &member) in members.iter().enumerate() {
+            let wave = &waves[member];
             let k = wave.wavenumber.length();
             let omega = wave.angular_frequency;
             // Waves whose own wave number is not that of still water keep the ratio.
             let ratio = k / water.wavenumber(omega);
+            let q = if axis.is_multiple_of(2) { wave.wavenumber.y } else { wave.wavenumber.x };
+            // No shorter than what the grid resolves.
+            let finest = k + 2.4 / grid.spacing.max_element();
             for (step, entry) in self.table.iter_mut().enumerate() {
                 let s = (step as f64 / STEPS as f64).clamp(1e-3, 1.0);
                 let h = if s >= 1.0 { f64::INFINITY } else { SCALE * s * s / (1.0 - s * s) };
-                let here = StillWater { depth: h, ..StillWater::DEEP };
-                let k = quick(omega, h);
-                entry[0].0[l] = (k * ratio * s) as f32;
-                entry[1].0[l] = here.group_speed(k) as f32;
+                let still = quick(omega, h);
+                let k = (still * ratio).min(finest);
+                let p = (k * k - q * q).max(0.02 * k * k).sqrt();
+                let speed = StillWater { depth: h, ..StillWater::DEEP }.group_speed(still);
+                let values = [p * s, 1.0 / p.sqrt(), (k / (speed * p)).sqrt() * s];
+                entry.iter_mut().zip(values).for_each(|(to, value)| to.0[l] = value as f32);
             }
-            let forward = AXES[axis];
-            let across = if axis.is_multiple_of(2) { wave.wavenumber.y } else { wave.wavenumber.x };
-            let step = grid.spacing.max_element();
-            self.across.0[l] = across as f32;
-            self.finest.0[l] = (k + 2.4 / step) as f32;
             // What the march itself makes of the open sea's depth, to the bit.
             let s = squeeze(depth);
-            let at = s * STEPS as f32;
-            let index = (at as usize).min(STEPS - 1);
-            let f = at - index as f32;
-            let between = |part: usize| {
-                let (a, b) = (self.table[index][part].0[l], self.table[index + 1][part].0[l]);
-                f.mul_add(b - a, a)
+            let (index, f) = march::entry(s);
+            let at = |part: usize| {
+                let (low, high) = (self.table[index][part].0[l], self.table[index + 1][part].0[l]);
+                f.mul_add(high - low, low) * (1.0 / s)
             };
-            let k = (between(0) * (1.0 / s)).min(self.finest.0[l]);
-            let q = self.across.0[l];
-            let along = k.mul_add(k, -(q * q)).max(0.02 * k * k).sqrt();
-            debug_assert!(wave.wavenumber.dot(forward) > 0.0);
-            self.along.0[l] = along;
-            self.flux.0[l] = between(1) * along / k;
-            let energy = 0.5 * wave.amplitude * wave.amplitude;
-            self.energy.0[l] = if idle { 0.0 } else { energy as f32 };
+            self.along.0[l] = at(0);
+            let open = at(2);
+            self.table.iter_mut().for_each(|entry| entry[2].0[l] /= open);
+            debug_assert!(wave.wavenumber.dot(AXES[axis]) > 0.0);
+            self.across.0[l] = q as f32;
+            self.energy.0[l] = (0.5 * wave.amplitude * wave.amplitude) as f32;
+        }
+        // Idle lanes carry the first wave without energy.
+        for l in members.len()..LANES {
+            let lists = self.table.iter_mut().flatten().chain([&mut self.across, &mut self.along]);
+            lists.for_each(|list| list.0[l] = list.0[0]);
+            self.energy.0[l] = 0.0;
         }
     }
 }
@@ -442,14 +443,15 @@ pub(super) fn quick(omega: f64, depth: f64) -> f64 {
 }
 
 impl Batch {
-    /// Marches over the whole grid; false if it was told to stop.
-    fn walk(&mut self, grid: &Grid, share: f32, rim: f32, settings: &Settings, progress: &Progress<'_>) -> bool {
-        let Batch { axis, waves, march, nodes, sides, records, told, before, kept, kept_b, kept_whole, .. } = self;
+    /// Marches over the whole grid; false if it was told to stop. Unless it is `alone`, it must march again from where waves may break.
+    fn walk(&mut self, grid: &Grid, share: f32, alone: bool, progress: &Progress<'_>) -> bool {
+        let Batch { axis, members, waves, march, nodes, sides, records, told, before, kept, kept_b, kept_whole } = self;
         let Some(waves) = waves else { return true };
         let (columns, rows) = (grid.columns, grid.rows);
         let count = columns * rows;
-        records.resize(count, Record::NONE);
-        told.resize(count, Told::default());
+        let waves_told = members.len();
+        resize(records, count * waves_told, 0);
+        resize(told, count, Told::default());
         let along_x = axis.is_multiple_of(2);
         let (steps, across) = if along_x { (columns, rows) } else { (rows, columns) };
         let (forward, apart) =
@@ -466,53 +468,49 @@ impl Batch {
         }
         nodes.resize(across, Node::default());
         sides.clear();
-        sides.extend((0..across).map(|j| outward(j, across, apron_across)));
+        sides.extend((0..across).map(|j| outward(j, across, apron_across) as f32));
         let at = |step: usize, j: usize| {
             let step = if backward { steps - 1 - step } else { step };
             if along_x { j * columns + step } else { step * columns + j }
         };
         for step in first..steps {
-            let out = outward(step, steps, apron_along);
-            for (j, node) in nodes.iter_mut().enumerate() {
+            let out = outward(step, steps, apron_along) as f32;
+            for (j, (node, side)) in nodes.iter_mut().zip(&*sides).enumerate() {
                 let i = at(step, j);
-                let away = out.max(sides[j]) as f32;
-                let open = ((away - 0.4) / 0.6).clamp(0.0, 1.0);
                 *node = Node {
                     s: grid.s[i],
                     near: grid.near[i],
                     draw: 0.0,
-                    open: open * open * (3.0 - 2.0 * open),
-                    cap: limit(grid.s[i], rim, settings),
-                    others: if before.is_empty() { 0.0 } else { before[i] },
+                    open: smooth(0.4, 1.0, out.max(*side)),
+                    cap: grid.cap[i],
+                    others: if again { before[i] } else { 0.0 },
                 };
             }
             if !again && kept.is_none() {
                 kept_b.clone_from(&march.b);
                 kept_whole.clone_from(&march.whole);
             }
-            march::settle(march, waves, nodes, share);
+            let tell = alone || again || kept.is_none();
+            march::settle(march, waves, nodes, share, tell);
             // Well before the limit, for what the other batches come to is only guessed in the first march.
             if !again && kept.is_none() && nodes.iter().zip(&march.told).any(|(n, t)| t.energy * share > 0.3 * n.cap) {
                 *kept = Some(step);
             }
             for j in 0..across {
                 let i = at(step, j);
-                records[i] = march.records[j];
                 told[i] = march.told[j];
+                if tell {
+                    records[i * waves_told..][..waves_told].copy_from_slice(&march.records[j][..waves_told]);
+                }
             }
             if step + 1 == steps {
                 break;
             }
-            for (j, node) in nodes.iter_mut().enumerate() {
-                let (here, next) = (at(step, j), at(step + 1, j));
-                let side = sides[j];
-                let pull = 5.0 * side * side / apron_across as f64 * (forward / apart);
-                *node = Node {
-                    s: 0.5 * (grid.s[here] + grid.s[next]),
-                    near: grid.near[next],
-                    draw: pull.min(1.0) as f32,
-                    ..*node
-                };
+            let most = (5.0 * forward / (apart * apron_across as f64)) as f32;
+            for (j, (node, side)) in nodes.iter_mut().zip(&*sides).enumerate() {
+                let next = at(step + 1, j);
+                (node.s, node.near) = (0.5 * (node.s + grid.s[next]), grid.near[next]);
+                node.draw = (most * side * side).min(1.0);
             }
             march::advance(march, waves, nodes, forward as f32, apart as f32);
             if step % 16 == 15 && !progress.count(16) {
