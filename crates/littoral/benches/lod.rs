@@ -1,10 +1,8 @@
 //! Grids that follow the eye: the set-ups of the papers, and every method on one view of land and of sea. Processor time.
 //!
 //! * *Nested grids*, 2009: six windows of 32 cells over a sea of 16 × 8 waves, heights and normals, 1024 × 768 pixels.
-//! * *Patches*, 2016: a globe's relief in 16 384 × 8 192 samples (`LITTORAL_GLOBE=1`; two gigabytes), 1920 × 1080 pixels.
 
 mod clock;
-mod globe;
 
 use clock::{median, processor_time};
 use glam::{DVec2, DVec3, UVec2, Vec3};
@@ -18,31 +16,7 @@ use std::hint::black_box;
 
 fn main() {
     nested();
-    if std::env::var_os("LITTORAL_GLOBE").is_some() {
-        on_a_globe();
-    } else {
-        everyone();
-    }
-}
-
-/// The set-up of 2016: six levels between the coarsest patches and the finest, and all of them.
-fn on_a_globe() {
-    let land = globe::land(globe::COLUMNS);
-    for (finest, tolerance) in [(11, 1.0), (14, 1.0), (14, 0.5), (14, 0.25)] {
-        let view = globe::view(tolerance);
-        let mut lod = Patches::new(Limits { finest, triangles: 4_000_000 });
-        let mut drawing = Drawing::default();
-        let mut pixels = 0.0;
-        let mut look = || pixels = lod.select(&land, &view, &mut drawing).expect("a view").pixels;
-        look();
-        let seconds = median(9, look);
-        println!(
-            "patches over a globe's relief, down to level {finest} ({} triangles in all), {tolerance} pixels asked: {:.2} ms, {} triangles, {pixels:.2} pixels",
-            2u64 << (2 * finest - 1),
-            seconds * 1e3,
-            drawing.triangles()
-        );
-    }
+    everyone();
 }
 
 /// A sea of 16 frequencies in 8 directions, 3 km a side.

@@ -19,7 +19,7 @@ fn main() {
     land.error(littoral::space::Cell::face(0));
     println!("errors of the land's cells measured once in {:.2} s", processor_time() - begin);
     one.install(|| {
-        for tolerance in [4.0, 2.0, 1.0, 0.5, 0.25] {
+        for tolerance in [4.0, 2.0, 1.0, 0.5, 0.25, 0.1] {
             frame(&land, &land, tolerance);
         }
     });

@@ -13,6 +13,7 @@
 use super::{Raster, Window};
 use crate::memory::in_large_pages;
 use crate::space::Cell;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Error bounds of every cell above the patches; patches answer from their own corners.
@@ -215,10 +216,21 @@ fn patch_twist(raster: &Raster, column: usize, row: usize) -> Option<f32> {
     Some(quarter_twist([at(0, 0)?, at(1, 0)?, at(0, 1)?, at(1, 1)?]))
 }
 
+#[inline(always)]
 pub(super) fn quarter_twist([a, b, c, d]: [f32; 4]) -> f32 {
     // Three roundings of differences, paid for by one part in two million of the heights.
     let size = a.abs().max(b.abs()).max(c.abs().max(d.abs()));
     0.25 * ((a - b) - (c - d)).abs() + size * f32::EPSILON
+}
+
+/// The same for patches in a row, between their samples to the south and to the north.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+pub(super) fn quarter_twists(south: &[f32], north: &[f32], twists: &mut [f32]) {
+    let count = twists.len();
+    let (south, north) = (&south[..count + 1], &north[..count + 1]);
+    for i in 0..count {
+        twists[i] = quarter_twist([south[i], south[i + 1], north[i], north[i + 1]]);
+    }
 }
 
 /// The greatest vertical distance between the surface of a whole cell and two triangles over its corners, whichever

@@ -4,7 +4,8 @@
 //! face of the land's datum is the raster padded to 2ᵏ × 2ᵏ patches, so that cells of level k are exactly the patches and
 //! every cell's corners lie on samples; the padding is void and never shows.
 
-use super::deviation::quarter_twist;
+use super::deviation::{quarter_twist, quarter_twists};
+use super::lattice::Samples;
 use super::pyramid::window_range;
 use super::{ErrorPyramid, HeightField, HeightRange, RangePyramid, Raster, Window};
 use crate::space::{Cell, Datum, Place};
@@ -196,6 +197,18 @@ impl Land {
         }
     }
 
+    /// Errors of patches in a row, of land without voids.
+    fn patch_errors(&self, column: usize, row: usize, errors: &mut [f32]) {
+        let (columns, rows) = (self.raster.columns(), self.raster.rows());
+        let inside = if row + 1 < rows { (columns - 1).saturating_sub(column).min(errors.len()) } else { 0 };
+        let (within, beyond) = errors.split_at_mut(inside);
+        beyond.fill(0.0);
+        if inside > 0 {
+            let line = |row: usize| &self.raster.heights()[row * columns + column..][..inside + 1];
+            quarter_twists(line(row), line(row + 1), within);
+        }
+    }
+
     /// Range of the surface over a part of one patch, `from` and `to` being positions within it. Over a rectangle a
     /// bilinear function takes its extremes in the corners.
     fn part_range(&self, column: usize, row: usize, from: DVec2, to: DVec2) -> HeightRange {
@@ -262,6 +275,37 @@ impl HeightField for Land {
             for (i, (range, error)) in ranges.iter_mut().zip(errors).enumerate() {
                 let cell = Cell { x: first.x + i as u32, ..first };
                 (*range, *error) = (self.range(cell), pyramid.error(&self.raster, cell));
+            }
+        }
+    }
+
+    fn errors(&self, first: Cell, errors: &mut [f32]) {
+        let pyramid = self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest));
+        if pyramid.row(first, errors) {
+            return;
+        }
+        if first.level == self.finest && !self.raster.voids().any() {
+            self.patch_errors(first.x as usize, first.y as usize, errors);
+        } else {
+            for (i, error) in errors.iter_mut().enumerate() {
+                *error = pyramid.error(&self.raster, Cell { x: first.x + i as u32, ..first });
+            }
+        }
+    }
+
+    fn lattice(&self, _: u8, points: &[[u32; 2]], heights: &mut [f32]) {
+        assert_eq!(points.len(), heights.len(), "expected as many heights as points");
+        let samples = Samples {
+            heights: self.raster.heights(),
+            columns: self.raster.columns(),
+            rows: self.raster.rows(),
+            shift: u32::from(Cell::MAX_LEVEL - self.finest),
+        };
+        if self.raster.voids().any() || !samples.read(points, heights) {
+            let steps = f64::exp2(-f64::from(Cell::MAX_LEVEL - self.finest));
+            for (height, &[x, y]) in heights.iter_mut().zip(points) {
+                let at = DVec2::new(f64::from(x), f64::from(y)) * steps;
+                *height = self.height_at_lattice(at).unwrap_or(f32::NAN);
             }
         }
     }

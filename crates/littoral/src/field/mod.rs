@@ -8,6 +8,7 @@ pub mod coast;
 mod deviation;
 mod lakes;
 mod land;
+mod lattice;
 pub mod noise;
 mod pyramid;
 mod raster;
@@ -26,6 +27,7 @@ pub use water::{Beach, Water};
 pub(crate) use windows::FINEST_WINDOWS;
 
 use crate::space::{Cell, Datum, Place};
+use glam::DVec2;
 
 /// The lowest and the highest height of something (m). Empty when `low > high`: there is no surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -96,6 +98,13 @@ pub trait HeightField: Sync {
         }
     }
 
+    /// Errors of cells in a row, `first` being the westernmost. Overridden where bulk is faster.
+    fn errors(&self, first: Cell, errors: &mut [f32]) {
+        for (i, error) in errors.iter_mut().enumerate() {
+            *error = self.error(Cell { x: first.x + i as u32, ..first });
+        }
+    }
+
     /// `side` × `side` heights over `cell`, its borders included, row by row from the south-west; NaN where void.
     ///
     /// # Panics
@@ -106,7 +115,7 @@ pub trait HeightField: Sync {
         let (corner, step) = (cell.low_corner(), cell.side() / (side - 1) as f64);
         for (row, line) in heights.chunks_exact_mut(side).enumerate() {
             for (column, height) in line.iter_mut().enumerate() {
-                let uv = corner.uv + glam::DVec2::new(column as f64, row as f64) * step;
+                let uv = corner.uv + DVec2::new(column as f64, row as f64) * step;
                 *height = self.height(Place { uv, ..corner }).unwrap_or(f32::NAN);
             }
         }
@@ -120,6 +129,24 @@ pub trait HeightField: Sync {
         assert_eq!(places.len(), heights.len(), "expected as many heights as places");
         for (place, height) in places.iter().zip(heights) {
             *height = self.height(*place).unwrap_or(f32::NAN);
+        }
+    }
+
+    /// Heights at points of a face's lattice, 2³⁰ steps a side; NaN where void. Overridden where bulk is faster.
+    ///
+    /// # Panics
+    /// If the slices differ in length.
+    fn lattice(&self, face: u8, points: &[[u32; 2]], heights: &mut [f32]) {
+        assert_eq!(points.len(), heights.len(), "expected as many heights as points");
+        const SOME: usize = 64;
+        let mut places = [Place { face, uv: DVec2::ZERO }; SOME];
+        let step = f64::exp2(-f64::from(Cell::MAX_LEVEL));
+        for (points, heights) in points.chunks(SOME).zip(heights.chunks_mut(SOME)) {
+            let places = &mut places[..points.len()];
+            for (place, &[x, y]) in places.iter_mut().zip(points) {
+                place.uv = DVec2::new(f64::from(x), f64::from(y)) * step;
+            }
+            self.heights(places, heights);
         }
     }
 }

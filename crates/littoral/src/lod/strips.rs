@@ -7,20 +7,23 @@
 //! pages can be walked in any order, by many threads, and the bound holds. Where the land goes deeper than a page, pages lie within pages.
 //!
 //! A vertex that a side leaves out is off by no more than the coarser cell beside it: where a cell's own bound is held to half the tolerance, and
-//! counted with the nearest of its neighbours, cells and seams together keep it.
+//! counts as far as half a cell beyond it, cells and seams together keep it. How near and how visible cells are is taken from slabs: the least and
+//! the greatest height of a sixteenth of the page and what is beside it, as the paper's footprint has one slab for all.
 
 mod page;
+mod stage;
 mod walk;
 
 use super::drawing::{STEPS, Vertex};
 use super::{Drawing, Limits, Lod, Reached, ScreenMetric, ViewError};
 use crate::field::HeightField;
-use crate::space::{Cell, Datum, Place, View};
+use crate::space::{Cell, Datum, View};
 use glam::DVec2;
+use multiversion::multiversion;
 use page::{Asked, DEPTH, Page, SEAMS, halve};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use walk::{Beyond, Rows, Walk};
+use walk::{Beyond, Rows, Trail, Walk};
 
 /// Strips of triangles, page by page.
 #[derive(Clone, Debug)]
@@ -39,52 +42,80 @@ pub struct Strips {
 #[derive(Clone, Debug, Default)]
 struct Tier {
     depth: u8,
+    /// Those in use, and others that wait for their turn.
     pages: Vec<Page>,
+    used: usize,
     index: FxHashMap<[u32; 2], u32>,
+    /// Pages by how doubtful their bounds are (pixels).
+    doubts: Vec<(f32, usize)>,
 }
 
 /// What a walk brings home.
 #[derive(Clone, Debug, Default)]
 struct Walked {
     rows: Rows,
+    trail: Trail,
     vertices: Vec<Vertex>,
     ends: Vec<u32>,
-    slivers: Vec<[Vertex; 3]>,
 }
 
 /// Pages fewer than these are not worth other threads.
 const FEW: usize = 64;
 
-/// Pages that are walked one after the other.
-const TOGETHER: usize = 16;
-
 impl Tier {
     fn clear(&mut self, depth: u8) {
         self.depth = depth;
-        self.pages.clear();
+        self.used = 0;
         self.index.clear();
     }
 
     /// The page over a cell, made if it is not there.
     fn page(&mut self, cell: Cell) -> &mut Page {
-        let Tier { depth, pages, index } = self;
+        let Tier { depth, pages, used, index, .. } = self;
         let number = *index.entry([cell.x, cell.y]).or_insert_with(|| {
-            pages.push(Page::of(cell, *depth));
-            pages.len() as u32 - 1
+            match pages.get_mut(*used) {
+                Some(page) => page.turn(cell, *depth),
+                None => pages.push(Page::of(cell, *depth)),
+            }
+            *used += 1;
+            *used as u32 - 1
         });
         &mut pages[number as usize]
+    }
+
+    /// The pages in use.
+    fn pages(&self) -> &[Page] {
+        &self.pages[..self.used]
     }
 
     fn find(&self, x: u32, y: u32) -> Option<&Page> {
         self.index.get(&[x, y]).map(|&number| &self.pages[number as usize])
     }
 
+    /// Raises the greatest bound (pixels) by what was in doubt: the most doubtful pages first, until none may raise it.
+    fn resolve(&mut self, asked: &Asked, mut worst: f32) -> f32 {
+        let mut doubts = std::mem::take(&mut self.doubts);
+        doubts.clear();
+        let pages = self.pages().iter().enumerate();
+        doubts.extend(pages.filter(|(_, page)| page.doubt > worst).map(|(number, page)| (page.doubt, number)));
+        doubts.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        for &(doubt, number) in &doubts {
+            if doubt <= worst {
+                break;
+            }
+            worst = self.pages[number].resolve(asked).max(worst);
+        }
+        self.doubts = doubts;
+        worst
+    }
+
     /// Does something with every page, on several threads if there are many.
     fn each<T: Send>(&mut self, work: impl Fn(&mut Page) -> T + Sync + Send, join: fn(T, T) -> T) -> Option<T> {
-        if self.pages.len() < FEW {
-            self.pages.iter_mut().map(work).reduce(join)
+        let pages = &mut self.pages[..self.used];
+        if pages.len() < FEW {
+            pages.iter_mut().map(work).reduce(join)
         } else {
-            self.pages.par_iter_mut().map(work).reduce_with(join)
+            pages.par_iter_mut().map(work).reduce_with(join)
         }
     }
 }
@@ -124,13 +155,14 @@ impl Strips {
             let (coarse, fine) = self.tiers.split_at_mut(i + 1);
             let tier = &mut coarse[i];
             worst = tier.each(|page| page.refine(&asked), f32::max).map_or(worst, |bound| bound.max(worst));
-            leaves += tier.pages.iter().map(Page::count).sum::<usize>();
-            let pages = tier.pages.iter().map(Page::below).sum::<usize>();
+            worst = tier.resolve(&asked, worst);
+            leaves += tier.pages().iter().map(Page::count).sum::<usize>();
+            let pages = tier.pages().iter().map(Page::below).sum::<usize>();
             if leaves + 3 * pages > most {
                 return Err(leaves + 3 * pages);
             }
             if let Some(fine) = fine.first_mut() {
-                tier.pages.iter().for_each(|page| for_bits(page, |cell| _ = fine.page(cell)));
+                tier.pages().iter().for_each(|page| for_bits(page, |cell| _ = fine.page(cell)));
             }
         }
         self.balance();
@@ -186,16 +218,16 @@ impl Strips {
             // What lies below a page is cut.
             if let Some(fine) = fine.first() {
                 let up = tier.depth;
-                for page in &fine.pages {
+                for page in fine.pages() {
                     let (x, y) = (page.cell.x, page.cell.y);
                     let above = Cell { level: page.cell.level - up, x: x >> up, y: y >> up, ..page.cell };
                     let mask = (1u32 << up) - 1;
-                    tier.page(above).cut[page::row(up, y & mask)] |= 1 << (x & mask);
+                    tier.page(above).mark(up, y & mask, 1 << (x & mask));
                 }
             }
             for level in (1..=tier.depth).rev() {
                 let mut number = 0;
-                while number < tier.pages.len() {
+                while number < tier.used {
                     tier.grow(number, level);
                     number += 1;
                 }
@@ -225,30 +257,35 @@ impl Tier {
         let cell = self.pages[number].cell;
         let cells = 1u32 << cell.level;
         let half = side / 2;
+        if self.pages[number].last < level {
+            return;
+        }
+        // Rows with a cut cell at the western and at the eastern side.
+        let (mut western, mut eastern) = (0, 0);
         for y in 0..side {
             let page = &mut self.pages[number];
             let bits = page.cut[page::row(level, y)];
             if bits == 0 {
                 continue;
             }
-            page.cut[page::row(level - 1, y >> 1)] |= halve((bits | bits << 1 | bits >> 1) & all);
+            page.mark(level - 1, y >> 1, halve((bits | bits << 1 | bits >> 1) & all));
             for beyond in [y.checked_sub(1), Some(y + 1).filter(|&y| y < side)].into_iter().flatten() {
-                page.cut[page::row(level - 1, beyond >> 1)] |= halve(bits);
+                page.mark(level - 1, beyond >> 1, halve(bits));
             }
-            let first = y == 0 && cell.y > 0;
-            let last = y == side - 1 && cell.y + 1 < cells;
-            if first {
-                self.page(Cell { y: cell.y - 1, ..cell }).cut[page::row(level - 1, half - 1)] |= halve(bits);
+            if y == 0 && cell.y > 0 {
+                self.page(Cell { y: cell.y - 1, ..cell }).mark(level - 1, half - 1, halve(bits));
             }
-            if last {
-                self.page(Cell { y: cell.y + 1, ..cell }).cut[page::row(level - 1, 0)] |= halve(bits);
+            if y == side - 1 && cell.y + 1 < cells {
+                self.page(Cell { y: cell.y + 1, ..cell }).mark(level - 1, 0, halve(bits));
             }
-            if bits & 1 == 1 && cell.x > 0 {
-                self.page(Cell { x: cell.x - 1, ..cell }).cut[page::row(level - 1, y >> 1)] |= 1 << (half - 1);
-            }
-            if bits >> (side - 1) & 1 == 1 && cell.x + 1 < cells {
-                self.page(Cell { x: cell.x + 1, ..cell }).cut[page::row(level - 1, y >> 1)] |= 1;
-            }
+            western |= (bits & 1) << y;
+            eastern |= (bits >> (side - 1) & 1) << y;
+        }
+        let west = cell.x.checked_sub(1).map(|x| (x, western, half - 1));
+        let east = Some((cell.x + 1, eastern, 0)).filter(|&(x, ..)| x < cells);
+        for (x, rows, column) in [west, east].into_iter().flatten().filter(|&(_, rows, _)| rows != 0) {
+            let (beside, rows) = (self.page(Cell { x, ..cell }), halve(rows));
+            (0..half).filter(|y| rows >> y & 1 == 1).for_each(|y| beside.mark(level - 1, y, 1 << column));
         }
     }
 }
@@ -283,7 +320,7 @@ impl Strips {
         let eye = (view.eye.truncate() - origin) / size;
         self.order.clear();
         for (i, tier) in self.tiers.iter().enumerate() {
-            for (number, page) in tier.pages.iter().enumerate() {
+            for (number, page) in tier.pages().iter().enumerate() {
                 let (low, side) = (page.cell.low_corner().uv, page.cell.side());
                 let away = (eye - eye.clamp(low, low + side)) * size;
                 self.order.push((away.length_squared(), i as u32, number as u32));
@@ -294,23 +331,23 @@ impl Strips {
             // One cell is all there is.
             if field.error(Cell::face(0)).is_finite() {
                 let corners = [[0, STEPS], [0, 0], [STEPS, STEPS], [STEPS, 0]];
-                drawing.mesh.vertices.extend(corners.map(|[x, y]| Vertex { x, y, face: 0, height: 0.0 }));
                 drawing.strips.push(4);
-                lift(field, &mut drawing.mesh.vertices);
+                raise(field, 0, &corners, &mut drawing.mesh.vertices);
             }
             return;
         }
         let (tiers, order) = (&self.tiers, &self.order);
         if order.len() < FEW || rayon::current_num_threads() == 1 {
-            for pages in order.chunks(TOGETHER) {
-                let Drawing { mesh, strips, .. } = &mut *drawing;
-                self.walked[0].pages(tiers, pages, turned, field, &mut mesh.vertices, strips);
-            }
+            let Drawing { mesh, strips, .. } = drawing;
+            self.walked[0].pages(tiers, order, turned, field, &mut mesh.vertices, strips);
             return;
         }
-        let parties = order.len().div_ceil(TOGETHER);
+        // Parts of what is walked over, a few for each thread, that are put together in order.
+        let parties = 4 * rayon::current_num_threads();
+        let together = order.len().div_ceil(parties);
         self.walked.resize_with(parties.max(self.walked.len()), Walked::default);
-        self.walked.par_iter_mut().zip(order.par_chunks(TOGETHER)).for_each(|(walked, pages)| {
+        let parties = order.len().div_ceil(together);
+        self.walked.par_iter_mut().zip(order.par_chunks(together)).for_each(|(walked, pages)| {
             let (mut vertices, mut ends) = (std::mem::take(&mut walked.vertices), std::mem::take(&mut walked.ends));
             vertices.clear();
             ends.clear();
@@ -337,25 +374,20 @@ impl Walked {
         ends: &mut Vec<u32>,
     ) {
         for &(_, tier, number) in pages {
-            let begun = vertices.len();
-            self.page(tiers, [tier, number].map(|i| i as usize), turned, vertices, ends);
-            for sliver in self.slivers.drain(..) {
-                vertices.extend(sliver);
+            let face = self.page(tiers, [tier, number].map(|i| i as usize), turned);
+            let (points, strips) = self.trail.strips();
+            let begun = vertices.len() as u32;
+            ends.extend(strips.iter().map(|end| begun + end));
+            raise(field, face, points, vertices);
+            for sliver in self.trail.slivers() {
+                raise(field, face, sliver, vertices);
                 ends.push(vertices.len() as u32);
             }
-            lift(field, &mut vertices[begun..]);
         }
     }
 
     /// Walks over a page.
-    fn page(
-        &mut self,
-        tiers: &[Tier],
-        [tier, number]: [usize; 2],
-        turned: bool,
-        vertices: &mut Vec<Vertex>,
-        ends: &mut Vec<u32>,
-    ) {
+    fn page(&mut self, tiers: &[Tier], [tier, number]: [usize; 2], turned: bool) -> u8 {
         let page = &tiers[tier].pages[number];
         let Cell { x, y, level, face } = page.cell;
         let beyond = [(0i64, -1i64), (1, 0), (0, 1), (-1, 0)].map(|(i, j)| {
@@ -374,24 +406,33 @@ impl Walked {
             Beyond { page, cell }
         });
         self.rows.load(page, beyond, turned);
-        let step = walk::step(page);
-        let side = step << page.depth;
+        let side = STEPS >> level;
         let corner = [x, y].map(|at| (at + u32::from(turned)) * side);
-        let Walked { rows, slivers, .. } = self;
-        let begun = vertices.len();
-        Walk { rows, vertices, ends, corner, turned, face: face.into(), step, pen: None, begun, slivers }.run();
+        let side = if turned { side.wrapping_neg() } else { side };
+        Walk { rows: &self.rows, trail: &mut self.trail, corner, side }.run();
+        face
     }
 }
 
-/// Gives vertices their heights.
-fn lift(field: &dyn HeightField, vertices: &mut [Vertex]) {
+/// Adds vertices at points of the lattice, with their heights.
+fn raise(field: &dyn HeightField, face: u8, points: &[[u32; 2]], vertices: &mut Vec<Vertex>) {
     const SOME: usize = 256;
-    let mut places = [Place { face: 0, uv: DVec2::ZERO }; SOME];
     let mut heights = [0.0; SOME];
-    for vertices in vertices.chunks_mut(SOME) {
-        let (places, heights) = (&mut places[..vertices.len()], &mut heights[..vertices.len()]);
-        places.iter_mut().zip(vertices.iter()).for_each(|(place, vertex)| *place = vertex.place());
-        field.heights(places, heights);
-        vertices.iter_mut().zip(heights).for_each(|(vertex, height)| vertex.height = *height);
+    let mut some = [Vertex { x: 0, y: 0, face: face.into(), height: 0.0 }; SOME];
+    for points in points.chunks(SOME) {
+        let (heights, some) = (&mut heights[..points.len()], &mut some[..points.len()]);
+        field.lattice(face, points, heights);
+        weave(face.into(), points, bytemuck::cast_slice(heights), bytemuck::cast_slice_mut(some));
+        vertices.extend_from_slice(some);
+    }
+}
+
+/// Puts points and heights together, as the numbers that vertices are.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn weave(face: u32, points: &[[u32; 2]], heights: &[u32], vertices: &mut [[u32; 4]]) {
+    let count = vertices.len();
+    let (points, heights) = (&points[..count], &heights[..count]);
+    for i in 0..count {
+        vertices[i] = [points[i][0], points[i][1], face, heights[i]];
     }
 }

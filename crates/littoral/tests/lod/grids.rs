@@ -3,7 +3,7 @@
 use super::{METHODS, Random, random_land};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::{Fbm, NoiseField};
-use littoral::lod::{Drawing, Limits, Lod, Nested};
+use littoral::lod::{Drawing, Limits, Lod, Nested, Strips};
 use littoral::space::View;
 
 fn hills() -> NoiseField {
@@ -76,4 +76,28 @@ fn only_what_is_seen_is_evaluated() {
     lod.select(&*surface.field, &view, &mut drawing).expect("a view");
     let south = drawing.mesh.vertices.iter().filter(|v| v.y < 1 << 28).count();
     assert_eq!(south, 0, "heights behind the eye");
+}
+
+/// Many pages are walked by many threads, and come out in the same order.
+#[test]
+fn strips_are_the_same_on_any_number_of_threads() {
+    let surface = random_land(1025, 1025, &mut Random::new(4));
+    let middle = surface.origin + 0.5 * surface.extent;
+    let eye = middle.extend(surface.extent.x);
+    let view = View::looking_at(eye, (middle + 1.0).extend(0.0), 1.0, UVec2::new(640, 640));
+    let drawn = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let (mut drawing, mut lod) = (Drawing::default(), Strips::new(Limits::default()));
+            lod.limits.finest = surface.finest;
+            lod.select(&*surface.field, &view, &mut drawing).expect("a view");
+            (drawing.mesh.vertices, drawing.strips)
+        })
+    };
+    let alone = drawn(1);
+    // More than sixty-four pages of equal cells hold.
+    assert!(alone.0.len() > 64 * 64 * 130, "{} vertices", alone.0.len());
+    for threads in [2, 5] {
+        assert!(drawn(threads) == alone, "on {threads} threads");
+    }
 }

@@ -101,6 +101,10 @@ impl HeightField for Counted<'_> {
         self.field.row(first, ranges, errors);
     }
 
+    fn errors(&self, first: Cell, errors: &mut [f32]) {
+        self.field.errors(first, errors);
+    }
+
     fn fill(&self, cell: Cell, side: usize, heights: &mut [f32]) {
         self.heights.fetch_add(heights.len(), Relaxed);
         self.field.fill(cell, side, heights);
@@ -109,5 +113,10 @@ impl HeightField for Counted<'_> {
     fn heights(&self, places: &[Place], heights: &mut [f32]) {
         self.heights.fetch_add(places.len(), Relaxed);
         self.field.heights(places, heights);
+    }
+
+    fn lattice(&self, face: u8, points: &[[u32; 2]], heights: &mut [f32]) {
+        self.heights.fetch_add(points.len(), Relaxed);
+        self.field.lattice(face, points, heights);
     }
 }

@@ -12,9 +12,8 @@
 //! A finer side leaves out what the coarser cell above, before or after it lacks. Where half of such a side has no surface the vertex stays, and
 //! an upright triangle closes the gap.
 
-use super::super::Vertex;
-use super::super::drawing::STEPS;
-use super::page::{DEPTH, Page, double, row};
+use super::page::{DEPTH, Page, SIDE, double, row};
+use std::ops::Range;
 
 /// Rows of all levels with the one before the page.
 const ROWS: usize = (2 << DEPTH) + DEPTH as usize;
@@ -55,7 +54,7 @@ impl Rows {
         self.depth = page.depth;
         let [south, east, north, west] = beyond;
         let above = if turned { north } else { south };
-        for level in 0..=page.depth {
+        for level in 0..=page.deepest() {
             let side = 1u32 << level;
             let order = |y: u32| if turned { side - 1 - y } else { y };
             let last = |of: Beyond, y: u32, x: u32| match of.page {
@@ -100,36 +99,106 @@ impl Rows {
     }
 }
 
-/// A point of a page, in halves of the cells of its last level, columns and rows in the order of the walk.
+/// A point of the face's lattice.
 type Point = [u32; 2];
+
+/// Two vertices, below and above.
+type Pair = [Point; 2];
+
+/// What no vertices are.
+const NONE: Pair = [[u32::MAX; 2]; 2];
+
+/// No cell says more than three pairs, and ends two strips.
+const POINTS: usize = 6 * SIDE * SIDE + 16;
+const ENDS: usize = 2 * SIDE * SIDE + 2;
+
+/// What a walk over a page leaves behind.
+#[derive(Clone, Debug)]
+pub(super) struct Trail {
+    points: Vec<Point>,
+    length: usize,
+    ends: Vec<u32>,
+    strips: usize,
+    /// Upright triangles.
+    slivers: Vec<[Point; 3]>,
+    /// Where the strip that goes on began.
+    begun: usize,
+    /// Its last pair.
+    pen: Pair,
+}
+
+impl Default for Trail {
+    fn default() -> Trail {
+        let (points, ends) = (vec![[0; 2]; POINTS], vec![0; ENDS]);
+        Trail { points, length: 0, ends, strips: 0, slivers: Vec::new(), begun: 0, pen: NONE }
+    }
+}
+
+impl Trail {
+    fn clear(&mut self) {
+        (self.length, self.strips, self.begun, self.pen) = (0, 0, 0, NONE);
+        self.slivers.clear();
+    }
+
+    /// The vertices of all strips, and where each ends.
+    pub fn strips(&self) -> (&[Point], &[u32]) {
+        (&self.points[..self.length], &self.ends[..self.strips])
+    }
+
+    /// The upright triangles.
+    pub fn slivers(&self) -> &[[Point; 3]] {
+        &self.slivers
+    }
+
+    /// Says a pair.
+    fn say(&mut self, pair: Pair) {
+        self.points[self.length..][..2].copy_from_slice(&pair);
+        self.length += 2;
+    }
+
+    /// Ends the strip, if there is one.
+    fn lift(&mut self) {
+        if self.length > self.begun {
+            self.ends[self.strips] = self.length as u32;
+            self.strips += 1;
+            self.begun = self.length;
+        }
+        self.pen = NONE;
+    }
+
+    /// Goes on from a pair, with a new strip unless it is the last one.
+    fn go_on(&mut self, pair: Pair) {
+        if self.pen != pair {
+            self.lift();
+            self.say(pair);
+        }
+    }
+}
 
 /// One who walks over a page.
 pub(super) struct Walk<'a> {
     pub rows: &'a Rows,
-    /// What is said.
-    pub vertices: &'a mut Vec<Vertex>,
-    /// Where strips end.
-    pub ends: &'a mut Vec<u32>,
-    /// Lattice point where the walk begins, and whether coordinates fall.
-    pub corner: [u32; 2],
-    pub turned: bool,
-    pub face: u32,
-    /// Lattice steps along a cell of the last level.
-    pub step: u32,
-    /// The last pair, below and above, while a strip goes on.
-    pub pen: Option<[Point; 2]>,
-    /// Where it began.
-    pub begun: usize,
-    /// Upright triangles.
-    pub slivers: &'a mut Vec<[Vertex; 3]>,
+    pub trail: &'a mut Trail,
+    /// Lattice point where the walk begins.
+    pub corner: Point,
+    /// Lattice steps along the page, negative (two's complement) where coordinates fall.
+    pub side: u32,
 }
 
-/// Rows of a level whose cells lie otherwise than beside their like.
-struct Special {
-    finer_above: u64,
-    coarser_above: u64,
-    coarser_before: u64,
-    coarser_after: u64,
+/// A row of cells: sides along it (lattice steps), and a bit for each cell whose neighbours are not its like.
+struct Row {
+    width: u32,
+    above: u32,
+    below: u32,
+    upper: bool,
+    drawn: u64,
+    /// Beside a coarser cell: its side leaves out its middle with that of the other row.
+    before: u64,
+    after: u64,
+    /// Both cells below a coarser one.
+    over: u64,
+    /// Below two finer ones.
+    finer: u64,
 }
 
 const EVEN: u64 = 0x5555_5555_5555_5555;
@@ -137,68 +206,22 @@ const EVEN: u64 = 0x5555_5555_5555_5555;
 impl Walk<'_> {
     /// Walks over the page.
     pub fn run(&mut self) {
+        self.trail.clear();
         self.row(0, 0, 0, 1);
-        self.lift();
-    }
-
-    fn vertex(&self, [x, y]: Point) -> Vertex {
-        // Halves: the level's step may be one.
-        let along = |from: u32, way: u32| {
-            let way = (u64::from(way) * u64::from(self.step) / 2) as u32;
-            if self.turned { from - way } else { from + way }
-        };
-        Vertex { x: along(self.corner[0], x), y: along(self.corner[1], y), face: self.face, height: 0.0 }
-    }
-
-    fn push(&mut self, pair: [Point; 2]) {
-        let [below, above] = pair.map(|point| self.vertex(point));
-        self.vertices.push(below);
-        self.vertices.push(above);
-        self.pen = Some(pair);
-    }
-
-    /// Ends the strip.
-    fn lift(&mut self) {
-        if self.vertices.len() > self.begun {
-            self.ends.push(self.vertices.len() as u32);
-            self.begun = self.vertices.len();
-        }
-        self.pen = None;
-    }
-
-    /// Goes on from a pair, with a new strip unless it is the last one.
-    fn go_on(&mut self, pair: [Point; 2]) {
-        if self.pen != Some(pair) {
-            self.lift();
-            self.push(pair);
-        }
+        self.trail.lift();
     }
 
     /// Walks along row `y` of a level, from column `from` to before column `to`; all cells there exist.
-    fn row(&mut self, level: u8, y: i64, from: u32, to: u32) {
-        let (cut, drawn) = (self.rows.cut(level, y), self.rows.drawn(level, y, 0));
-        let special = self.special(level, y);
-        let plain =
-            drawn & !(special.finer_above | special.coarser_above | special.coarser_before | special.coarser_after);
-        let width = 2u32 << (self.rows.depth - level);
-        let (above, below) = (y as u32 * width, (y as u32 + 1) * width);
-        let run = |bits: u64, x: u32| (bits >> x).trailing_ones().min(to - x);
+    fn row(&mut self, level: u8, y: u32, from: u32, to: u32) {
+        let cut = self.rows.cut(level, y.into());
+        let row = self.sides(level, y, from..to);
+        let run = |bits: u64, x: u32| bits.unbounded_shr(x).trailing_ones().min(to - x);
         let mut x = from;
         while x < to {
-            let same = run(plain, x);
-            if same > 0 {
-                self.go_on([[x * width, below], [x * width, above]]);
-                // Both advance by a cell: (a).
-                let ends = [below, above].map(|y| self.vertex([(x + 1) * width, y]));
-                let cell = self.step << (self.rows.depth - level);
-                let cell = if self.turned { cell.wrapping_neg() } else { cell };
-                self.vertices.extend((0..2 * same).map(|i| {
-                    let end = ends[(i & 1) as usize];
-                    Vertex { x: end.x.wrapping_add((i / 2).wrapping_mul(cell)), ..end }
-                }));
-                x += same;
-                self.pen = Some([[x * width, below], [x * width, above]]);
-                continue;
+            let drawn = run(row.drawn, x);
+            if drawn > 0 {
+                self.cells(x, x + drawn, &row);
+                x += drawn;
             }
             let finer = run(cut, x);
             if finer > 0 {
@@ -208,94 +231,120 @@ impl Walk<'_> {
                     self.row(level + 1, 2 * y + 1, 2 * x, 2 * (x + finer));
                 }
                 x += finer;
-            } else if drawn >> x & 1 == 1 {
-                self.special_cell(level, [x, y as u32], &special);
-                x += 1;
-            } else {
-                x += run(!(drawn | cut), x).max(1);
+            }
+            x += run(!(row.drawn | cut), x);
+        }
+    }
+
+    /// A row's sides and neighbours. Where only half of a coarser cell's side has a surface an upright triangle closes the gap.
+    fn sides(&mut self, level: u8, y: u32, part: Range<u32>) -> Row {
+        let width = (self.side as i32 >> level) as u32;
+        let above = self.corner[1].wrapping_add(y.wrapping_mul(width));
+        let y = i64::from(y);
+        let (drawn, finer, upper) = (self.rows.drawn(level, y, 0), self.rows.cut(level, y - 1), y & 1 == 0);
+        let mut row =
+            Row { width, above, below: above.wrapping_add(width), upper, drawn, before: 0, after: 0, over: 0, finer };
+        if level == 0 {
+            return row;
+        }
+        let coarse = |y: i64, column: i32| double(self.rows.drawn(level - 1, y, column));
+        let before = drawn & coarse(y >> 1, -1) & EVEN;
+        let after = drawn & coarse(y >> 1, 1) & !EVEN;
+        let over = if upper { drawn & coarse((y >> 1) - 1, 0) } else { 0 };
+        // A side leaves out its middle if both of its cells are drawn.
+        let column = self.rows.drawn(level, y ^ 1, 0);
+        let line = drawn >> 1 & EVEN | (drawn & EVEN) << 1;
+        (row.before, row.after, row.over) = (before & column, after & column, over & line);
+        let alone = [before & !column, after & !column, over & !line];
+        if alone.iter().any(|&bits| bits != 0) {
+            self.close(&row, alone, part);
+        }
+        row
+    }
+
+    /// Upright triangles where half of a coarser cell's side before, after or above is alone.
+    fn close(&mut self, row: &Row, [before, after, over]: [u64; 3], part: Range<u32>) {
+        let &Row { width, above, below, upper, .. } = row;
+        let middle = if upper { below } else { above };
+        // The ends of the coarser cell's sides.
+        let parent_above = if upper { above } else { above.wrapping_sub(width) };
+        let parent_below = if upper { below.wrapping_add(width) } else { below };
+        for x in part {
+            let is = |bits: u64| bits >> x & 1 == 1;
+            let west = self.corner[0].wrapping_add(x.wrapping_mul(width));
+            let east = west.wrapping_add(width);
+            if is(before) {
+                self.trail.slivers.push([[west, parent_below], [west, parent_above], [west, middle]]);
+            }
+            if is(after) {
+                self.trail.slivers.push([[east, middle], [east, parent_above], [east, parent_below]]);
+            }
+            if is(over) {
+                let (middle, parent_west) = if x & 1 == 1 { (west, west.wrapping_sub(width)) } else { (east, west) };
+                let parent_east = parent_west.wrapping_add(width.wrapping_mul(2));
+                self.trail.slivers.push([[middle, above], [parent_west, above], [parent_east, above]]);
             }
         }
     }
 
-    /// Which cells of a row have finer or coarser ones beside them.
-    fn special(&self, level: u8, y: i64) -> Special {
-        let finer_above = self.rows.cut(level, y - 1);
-        if level == 0 {
-            return Special { finer_above, coarser_above: 0, coarser_before: 0, coarser_after: 0 };
+    /// Cells of a row that are drawn, one beside the other.
+    fn cells(&mut self, from: u32, to: u32, row: &Row) {
+        let &Row { width, above, below, upper, .. } = row;
+        let half = (width as i32 / 2) as u32;
+        let trail = &mut *self.trail;
+        let mut west = self.corner[0].wrapping_add(from.wrapping_mul(width));
+        let mut first = [[west, below], [west, above]];
+        if row.before >> from & 1 == 1 {
+            // After a coarser cell the upper strip begins with all of its side, the lower at its corner.
+            first = if upper { [[west, below.wrapping_add(width)], [west, above]] } else { [[west, below]; 2] };
         }
-        let coarse = |y: i64, column: i32| double(self.rows.drawn(level - 1, y, column));
-        let upper = y & 1 == 0;
-        Special {
-            finer_above,
-            coarser_above: if upper { coarse((y >> 1) - 1, 0) } else { 0 },
-            coarser_before: coarse(y >> 1, -1) & EVEN,
-            coarser_after: coarse(y >> 1, 1) & !EVEN,
+        trail.go_on(first);
+        // (b): above finer cells the upper vertex advances by halves; (c): below a coarser one by both cells at once; else (a). Which it is, and how
+        // many cells there are, is data and no branch, since it could not be foreseen: four are written together, and what is too much is overwritten.
+        let cells = to - from;
+        let (finer, over) = (row.finer >> from, (row.over & EVEN) >> from);
+        let points = &mut trail.points[trail.length..];
+        let mut length = 0;
+        for x in (0..cells).step_by(4) {
+            let Some(four) = points[length..].first_chunk_mut::<16>() else { break };
+            let (finer, over, mut at) = (finer >> x, over >> x, 0);
+            for i in 0..4 {
+                let east = west.wrapping_add(width);
+                let ahead = east.wrapping_add(width & (over >> i & 1).wrapping_neg() as u32);
+                // `at` never exceeds 4 i: the mask spares the check.
+                four[at & 14] = [east, below];
+                four[(at & 14) + 1] = [west.wrapping_add(half), above];
+                at += 2 * (finer >> i & 1) as usize;
+                four[at & 14] = [east, below];
+                four[(at & 14) + 1] = [ahead, above];
+                at += 2;
+                west = east;
+            }
+            length += at;
         }
-    }
-
-    /// A cell beside finer or coarser ones.
-    fn special_cell(&mut self, level: u8, [x, y]: [u32; 2], special: &Special) {
-        let width = 2u32 << (self.rows.depth - level);
-        let (west, east, above, below) = (x * width, (x + 1) * width, y * width, (y + 1) * width);
-        let upper = y & 1 == 0;
-        let is = |bits: u64| bits >> x & 1 == 1;
-        let drawn = |x: u32, y: u32| self.rows.drawn(level, i64::from(y), 0) >> x & 1 == 1;
-        // A side leaves out its middle if both of its cells are drawn.
-        let (column, line) = (drawn(x, y ^ 1), drawn(x ^ 1, y));
-        let (before, after, over) = (is(special.coarser_before), is(special.coarser_after), is(special.coarser_above));
-        // The ends of the parent's sides.
-        let (parent_above, parent_below) = if upper { (above, below + width) } else { (above - width, below) };
-        let parent_west = (x & !1) * width;
-        if before && !column {
-            let middle = if upper { below } else { above };
-            self.sliver([[west, parent_below], [west, parent_above], [west, middle]]);
-        }
-        if after && !column {
-            let middle = if upper { below } else { above };
-            self.sliver([[east, middle], [east, parent_above], [east, parent_below]]);
-        }
-        if over && !line {
-            let middle = if x & 1 == 0 { east } else { west };
-            self.sliver([[middle, above], [parent_west, above], [parent_west + 2 * width, above]]);
-        }
-        let over = over && line;
-        self.go_on(match (before && column, upper) {
-            (true, true) => [[west, parent_below], [west, above]],
-            (true, false) => [[west, below], [west, below]],
-            // The second cell of (c): the upper vertex is there already.
-            (false, true) if over && x & 1 == 1 => [[west, below], [east, above]],
-            (false, _) => [[west, below], [west, above]],
-        });
-        let (mut last_below, mut last_above) = ([east, below], [east, above]);
-        match (after && column, upper) {
+        length = 2 * (cells + (finer & u64::MAX >> (64 - cells)).count_ones()) as usize;
+        let west = self.corner[0].wrapping_add(to.wrapping_mul(width));
+        trail.length += length;
+        let mut last = [[west, below], points[length - 1]];
+        let x = to - 1;
+        if row.after >> x & 1 == 1 {
             // (e): the upper strip ends at the coarser cell's corner, the lower goes on with its side.
-            (true, true) => last_below = [west, below],
-            (true, false) => last_above = [east, parent_above],
-            (false, _) => {}
+            if upper {
+                let corner = west.wrapping_sub(width);
+                let finer = row.finer >> x & 1 == 1;
+                points[length - 2][0] = corner;
+                if finer {
+                    points[length - 4][0] = corner;
+                } else if row.over >> x & 1 == 1 {
+                    // It is there already.
+                    trail.length -= 2;
+                }
+                trail.lift();
+                return;
+            }
+            last[1][1] = above.wrapping_sub(width);
+            points[length - 1] = last[1];
         }
-        if over && x & 1 == 0 {
-            // (c)
-            last_above = [east + width, above];
-        }
-        if is(special.finer_above) {
-            // (b)
-            self.push([last_below, [west + width / 2, above]]);
-        }
-        if self.pen != Some([last_below, last_above]) {
-            self.push([last_below, last_above]);
-        }
-        if after && column && upper {
-            self.lift();
-        }
+        trail.pen = last;
     }
-
-    fn sliver(&mut self, points: [Point; 3]) {
-        let sliver = points.map(|point| self.vertex(point));
-        self.slivers.push(sliver);
-    }
-}
-
-/// Lattice steps along the cells of a page's last level.
-pub(super) fn step(page: &Page) -> u32 {
-    STEPS >> (page.cell.level + page.depth)
 }
