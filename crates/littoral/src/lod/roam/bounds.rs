@@ -9,11 +9,12 @@
 
 use super::diamond::{Base, Diamond, Point, STEPS};
 use super::factors::{Factors, Slopes};
-use super::scan::{Item, Lens, Priority};
+use super::scan::{Item, Lens, Priority, SPLIT};
 use crate::field::{HeightField, Land};
 use crate::lod::ScreenMetric;
 use crate::memory::{filled, in_large_pages};
 use crate::space::{Cell, Datum};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Deviation and extent of a diamond, nested; and what its own triangles cover.
@@ -45,6 +46,12 @@ impl Bound {
     #[inline]
     pub(super) fn deviation(self) -> f32 {
         f32::from_bits(self.bits & !15)
+    }
+
+    /// Lowest and highest height in one number, the lowest in the lower half.
+    #[inline]
+    pub(super) fn heights(self) -> u32 {
+        u32::from(self.low) | u32::from(self.high) << 16
     }
 
     /// Whether there is surface under all of a triangle.
@@ -157,6 +164,47 @@ impl<T> Level<T> {
             Base::East => &self.east[tile(i, j, n)],
             Base::North => &self.north[tile(i, j, n + 1)],
         }
+    }
+}
+
+/// Which diamonds of a level of cells: those over diagonals, sides that run east, and sides that run north.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Square,
+    East,
+    North,
+}
+
+impl Kind {
+    pub(super) const ALL: [Kind; 3] = [Kind::Square, Kind::East, Kind::North];
+}
+
+/// The bounds of all diamonds of one level and kind.
+pub(super) struct Table<'a> {
+    pub bounds: &'a [Bound],
+    columns: u32,
+    /// Binary logarithm of a cell's side (steps).
+    unit: u32,
+}
+
+impl Table<'_> {
+    /// The bound of one, its middle in steps.
+    pub(super) fn bound(&self, at: u32) -> Bound {
+        self.bounds[tile((at & 0xffff) >> self.unit, (at >> 16) >> self.unit, self.columns)]
+    }
+
+    /// Puts where the bounds of many are into `slots`.
+    pub(super) fn slots(&self, at: &[u32], slots: &mut Vec<u32>) {
+        slots.clear();
+        slots.resize(at.len(), 0);
+        places(at, self.columns, self.unit, slots);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn places(at: &[u32], columns: u32, unit: u32, slots: &mut [u32]) {
+    for (slot, at) in slots.iter_mut().zip(at) {
+        *slot = tile((at & 0xffff) >> unit, (at >> 16) >> unit, columns) as u32;
     }
 }
 
@@ -278,6 +326,13 @@ impl NestedBounds {
         self.heights[y * self.side + x]
     }
 
+    /// Begins to load a height.
+    #[inline]
+    pub(super) fn expect_height(&self, at: Point) {
+        let [x, y] = self.sample(at);
+        prefetch(&self.heights[y * self.side + x]);
+    }
+
     #[inline]
     fn sample(&self, at: Point) -> [usize; 2] {
         at.map(|c| (c >> (Cell::MAX_LEVEL - self.finest)) as usize)
@@ -305,6 +360,11 @@ impl NestedBounds {
             self.slopes[usize::from(level)].squares = squares;
         }
         self
+    }
+
+    /// Whether slopes are kept.
+    pub(super) fn keeps_slopes(&self) -> bool {
+        !self.slopes.is_empty()
     }
 
     /// The slopes of all that needs a diamond; none if they were not asked for.
@@ -350,7 +410,7 @@ impl NestedBounds {
         let shift = self.shift();
         Item {
             at: diamond.at[0] >> shift | diamond.at[1] >> shift << 16,
-            heights: u32::from(bound.low) | u32::from(bound.high) << 16,
+            heights: bound.heights(),
             deviation: bound.deviation(),
             word: Item::word(kind, diamond.is_square(), diamond.half >> shift, record),
         }
@@ -362,30 +422,20 @@ impl NestedBounds {
         self.item_of(self.bound(diamond), diamond, kind, record)
     }
 
-    /// The children that a diamond, its middle in steps, is the first parent of.
-    #[inline]
-    pub(super) fn first_children(&self, at: u32, mut each: impl FnMut(Diamond)) {
-        let diamond = Diamond::at(self.point(at));
-        let ([x, y], h) = (diamond.at, diamond.half);
-        if diamond.is_square() {
-            let mut side = |at: Point, base: Base| each(Diamond { at, half: h, base });
-            side([x, y - h], Base::East);
-            side([x + h, y], Base::North);
-            if y + h == STEPS {
-                side([x, y + h], Base::East);
-            }
-            if x == h {
-                side([x - h, y], Base::North);
-            }
-        } else if x > 0 {
-            let q = h / 2;
-            if y > 0 {
-                each(Diamond { at: [x - q, y - q], half: q, base: Base::Falling });
-            }
-            if y < STEPS {
-                each(Diamond { at: [x - q, y + q], half: q, base: Base::Rising });
-            }
-        }
+    /// The bounds of the diamonds of a level above that of the samples.
+    pub(super) fn table(&self, level: u8, kind: Kind) -> Table<'_> {
+        let (all, n) = (&self.levels[usize::from(level)], 1 << level);
+        let (bounds, columns) = match kind {
+            Kind::Square => (&all.squares, n),
+            Kind::East => (&all.east, n),
+            Kind::North => (&all.north, n + 1),
+        };
+        Table { bounds, columns, unit: u32::from(self.finest + 1 - level) }
+    }
+
+    /// What is the same in the items of a level and kind.
+    pub(super) fn word(&self, level: u8, kind: Kind) -> u32 {
+        Item::word(SPLIT, kind == Kind::Square, (1 << self.finest) >> level, 0)
     }
 
     /// Whether there is surface under all of a triangle: the middle of its base and its apex, in steps.
@@ -401,27 +451,11 @@ impl NestedBounds {
         Lens::new(metric, self.datum, steps, (self.base, self.step), priority, self.voids, factors)
     }
 
-    /// Begins to load the bounds of those that a diamond is the first parent of.
+    /// Begins to load the bound of a diamond.
     #[inline]
-    pub(super) fn expect_first(&self, at: u32) {
-        self.first_children(at, |child| {
-            if child.cell_level() < self.finest {
-                prefetch(self.slot(child));
-            } else {
-                let [x, y] = self.sample(child.at);
-                prefetch(&self.heights[y * self.side + x]);
-            }
-        });
-    }
-
-    /// Begins to load what a split of the diamond will ask for.
-    pub(super) fn expect(&self, diamond: Diamond) {
-        let [x, y] = self.sample(diamond.at);
-        prefetch(&self.heights[y * self.side + x]);
-        for child in diamond.children().into_iter().flatten() {
-            if child.cell_level() < self.finest {
-                prefetch(self.slot(child));
-            }
+    pub(super) fn expect_bound(&self, diamond: Diamond) {
+        if diamond.cell_level() < self.finest {
+            prefetch(self.slot(diamond));
         }
     }
 

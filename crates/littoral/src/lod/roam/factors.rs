@@ -110,9 +110,10 @@ impl Weights {
         factor * (1.0 + self.lighting * ((sx[1] - sx[0]) + (sy[1] - sy[0])).min(16.0))
     }
 
-    /// Multiplies priorities by factors.
+    /// Multiplies priorities by factors; of slopes there are as many, or none.
     pub(super) fn weigh(&self, extent: impl Fn(&Item) -> Extent, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {
-        for ((item, &slopes), out) in items.iter().zip(slopes).zip(out) {
+        let slopes = slopes.iter().copied().chain(std::iter::repeat(Slopes::EMPTY));
+        for ((item, slopes), out) in items.iter().zip(slopes).zip(out) {
             // What is not there has no number, what is not seen none that a factor changes.
             if out.abs() > 0.0 {
                 *out *= self.of(&extent(item), slopes);

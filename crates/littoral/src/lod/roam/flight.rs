@@ -6,6 +6,9 @@
 //! two queues; and splits by falling and merges by rising priority go on until the queues agree. Ties fall to the coarser diamond, then by
 //! name: the outcome depends on the view alone, not on the way there.
 //!
+//! A frame that follows a stopped one looks at a few hundred of the most urgent first, and at the others only if there is time: putting all that is missing
+//! into queues would take the time of the steps.
+//!
 //! The mesh is kept, not made: a split turns two triangles into four and a merge four into two, in their places in one dense array, and
 //! what changed is told in ranges, so that a GPU need not be sent the rest.
 //!
@@ -22,7 +25,7 @@ use super::bounds::{Bound, NestedBounds};
 use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
 use super::factors::Factors;
 use super::ground::Ground;
-use super::scan::{Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
+use super::scan::{Between, Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
 use super::scratch::Search;
 use crate::lod::{Limits, Mesh, Reached, ScreenMetric, Vertex, ViewError};
 use crate::memory::push;
@@ -43,6 +46,9 @@ use queues::{Key, Queue};
 pub use sea::{RoamSea, Waves};
 
 const NONE: u32 = u32::MAX;
+
+/// The most merges that a frame after a stopped one looks at first.
+const URGENT: usize = 1024;
 
 /// A diamond of which there is a triangle, or that is split: a cache line.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +74,21 @@ struct Record {
     kids: u8,
 }
 
+/// A record of nothing yet.
+const NEW: Record = Record {
+    at: [0; 2],
+    parents: [NONE; 2],
+    children: [NONE; 4],
+    triangles: [NONE; 2],
+    ends: [NONE; 2],
+    bound: Bound::WATER,
+    place: NONE,
+    list: NOWHERE,
+    split: false,
+    held: 0,
+    kids: 0,
+};
+
 /// ROAM over prepared land, from view to view; over a sea it is [`RoamSea`](super::RoamSea).
 #[derive(Clone, Debug)]
 pub struct RoamFlight<'a, G = &'a NestedBounds> {
@@ -90,6 +111,8 @@ pub struct RoamFlight<'a, G = &'a NestedBounds> {
     splits: Queue,
     merges: Queue,
     band: (f32, f32),
+    /// If the last frame was stopped: the band of what is looked at first.
+    urgent: Option<(f32, f32)>,
     tolerance: f32,
     border: f32,
     lens: Option<Lens>,
@@ -101,6 +124,7 @@ pub struct RoamFlight<'a, G = &'a NestedBounds> {
     freed: Vec<u32>,
     changed: Changes,
     found: Vec<u32>,
+    found_merges: Vec<u32>,
     search: Search,
     /// Became splittable in the last step.
     ready: Vec<u32>,
@@ -149,6 +173,7 @@ impl<G: Ground> RoamFlight<'_, G> {
             splits: Queue::default(),
             merges: Queue::default(),
             band: (0.0, 0.0),
+            urgent: None,
             tolerance: 0.0,
             border: 0.0,
             lens: None,
@@ -159,6 +184,7 @@ impl<G: Ground> RoamFlight<'_, G> {
             freed: Vec::new(),
             changed: Changes::default(),
             found: Vec::new(),
+            found_merges: Vec::new(),
             search: Search::default(),
             ready: Vec::new(),
             operations: (0, 0),
@@ -232,14 +258,27 @@ impl<G: Ground> RoamFlight<'_, G> {
         self.merges.clear();
         self.band = (f32::INFINITY, -1.0);
         if self.records.is_empty() {
+            self.urgent = None;
             self.begin();
             self.descend();
         } else if let Some(lens) = &self.lens {
             let groups = self.groups.max(1) as usize;
             let turn = self.turn as usize % groups;
             let n = self.list.len();
-            self.list.measure(&self.bounds, lens, n * turn / groups..n * (turn + 1) / groups);
+            let part = n * turn / groups..n * (turn + 1) / groups;
             self.turn = self.turn.wrapping_add(1);
+            let (mut low, mut high) = self.whole_band();
+            if let Some(urgent) = self.urgent {
+                (low, high) = (urgent.0.max(low), urgent.1.min(high));
+            }
+            let (splits, merges) = (Between::new(low, f32::INFINITY), Between::new(-1.0, high));
+            let found = [&mut self.found, &mut self.found_merges];
+            self.list.measure(&self.bounds, lens, part, splits, merges, found);
+            if self.urgent.is_some() && self.found_merges.len() > URGENT {
+                // Of what is out of sight one is as good as the other.
+                self.found_merges.truncate(URGENT);
+            }
+            self.enter(low, high);
         }
         let stopped = self.balance(stop);
         self.compact();
@@ -286,35 +325,33 @@ impl<G: Ground> RoamFlight<'_, G> {
     }
 
     fn record(&mut self, diamond: Diamond, ends: [u32; 2]) -> u32 {
-        let record = Record {
-            at: diamond.at,
-            parents: [NONE; 2],
-            children: [NONE; 4],
-            triangles: [NONE; 2],
-            ends,
-            bound: self.bounds.bound(diamond),
-            place: NONE,
-            list: NOWHERE,
-            split: false,
-            held: 0,
-            kids: 0,
-        };
-        if let Some(unused) = self.unused.pop() {
-            self.records[unused as usize] = record;
-            return unused;
+        let bound = self.bounds.bound(diamond);
+        let unused = self.unused.pop();
+        let place = unused.unwrap_or(self.records.len() as u32);
+        if unused.is_none() {
+            push(&mut self.records, NEW);
         }
-        push(&mut self.records, record);
-        self.records.len() as u32 - 1
+        // Field by field: made elsewhere first, it would be read before it has arrived there.
+        let record = &mut self.records[place as usize];
+        record.at = diamond.at;
+        record.parents = [NONE; 2];
+        record.children = [NONE; 4];
+        record.triangles = [NONE; 2];
+        record.ends = ends;
+        record.bound = bound;
+        record.place = NONE;
+        (record.list, record.split, record.held, record.kids) = (NOWHERE, false, 0, 0);
+        place
     }
 
     /// Puts a record in the list, and in its queue if it is within the band.
     fn join(&mut self, record: u32, kind: u8) {
         let known = &self.records[record as usize];
         let diamond = Diamond::at(known.at);
-        let item = self.bounds.item(known.bound, diamond, kind, record);
+        let item = self.bounds.item(known.bound, diamond, self.idle(diamond), record);
         let slopes = self.bounds.slopes(diamond);
         let priority = self.lens.as_ref().map_or(0.0, |lens| self.bounds.priority(lens, &item, slopes));
-        let place = self.list.add(item, slopes, priority);
+        let place = self.list.add(item, slopes, priority, kind);
         let known = &mut self.records[record as usize];
         (known.place, known.list) = (place, kind);
         self.enqueue(record, diamond, kind, priority);

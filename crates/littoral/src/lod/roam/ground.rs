@@ -27,7 +27,8 @@ pub(super) trait Ground {
     /// What a diamond's record holds of its bound.
     fn bound(&self, diamond: Diamond) -> Bound;
 
-    fn slopes(&self, diamond: Diamond) -> Slopes;
+    /// The slopes of all that needs a diamond, if they are kept.
+    fn slopes(&self, diamond: Diamond) -> Option<Slopes>;
 
     /// What the priority of a diamond is computed from.
     fn item(&self, bound: Bound, diamond: Diamond, kind: u8, record: u32) -> Item;
@@ -37,16 +38,19 @@ pub(super) trait Ground {
 
     fn lens(&self, metric: &ScreenMetric, priority: Priority, factors: &Factors) -> Lens;
 
-    fn priority(&self, lens: &Lens, item: &Item, slopes: Slopes) -> f32;
+    fn priority(&self, lens: &Lens, item: &Item, slopes: Option<Slopes>) -> f32;
 
-    /// Priorities of many; the number of one that may be merged has its sign bit set.
+    /// Priorities of many, with as many slopes or none: numbers keep their signs, and what is none stays so.
     fn measure(&self, lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]);
 
     /// The last diamond that is split of those that make a mesh from nothing, if they can be searched for without a record of any.
     fn search(&self, search: &mut Search, lens: &Lens, finest: u8, tolerance: f32, budget: usize) -> Option<Order>;
 
-    /// Begins to load what the split of a diamond will ask for.
-    fn expect(&self, diamond: Diamond);
+    /// Begins to load the height of a vertex.
+    fn expect_height(&self, at: Point);
+
+    /// Begins to load what a diamond's record holds of its bound.
+    fn expect_bound(&self, diamond: Diamond);
 
     /// A vertex is no longer used.
     fn forget(&mut self, vertex: u32);
@@ -77,8 +81,8 @@ impl Ground for &NestedBounds {
     }
 
     #[inline]
-    fn slopes(&self, diamond: Diamond) -> Slopes {
-        NestedBounds::slopes(self, diamond)
+    fn slopes(&self, diamond: Diamond) -> Option<Slopes> {
+        self.keeps_slopes().then(|| NestedBounds::slopes(self, diamond))
     }
 
     #[inline]
@@ -96,7 +100,7 @@ impl Ground for &NestedBounds {
     }
 
     #[inline]
-    fn priority(&self, lens: &Lens, item: &Item, slopes: Slopes) -> f32 {
+    fn priority(&self, lens: &Lens, item: &Item, slopes: Option<Slopes>) -> f32 {
         lens.priority(item, slopes)
     }
 
@@ -109,8 +113,13 @@ impl Ground for &NestedBounds {
     }
 
     #[inline]
-    fn expect(&self, diamond: Diamond) {
-        NestedBounds::expect(self, diamond);
+    fn expect_height(&self, at: Point) {
+        NestedBounds::expect_height(self, at);
+    }
+
+    #[inline]
+    fn expect_bound(&self, diamond: Diamond) {
+        NestedBounds::expect_bound(self, diamond);
     }
 
     #[inline]

@@ -9,7 +9,7 @@ use super::super::ScreenMetric;
 use super::bounds::prefetch;
 use super::factors::{Factors, Slopes, Weights};
 use super::ground::Ground;
-use crate::space::{Cell, Datum, View};
+use crate::space::{Datum, View};
 use glam::DVec3;
 use multiversion::multiversion;
 
@@ -98,14 +98,14 @@ impl Lens {
     }
 
     /// The priority of one.
-    pub(super) fn priority(&self, item: &Item, slopes: Slopes) -> f32 {
+    pub(super) fn priority(&self, item: &Item, slopes: Option<Slopes>) -> f32 {
         let Item { at, heights, deviation, word } = *item;
         let number = match self.priority {
             Priority::ScreenError => priority::<true, true>(self, at, heights, deviation, word),
             Priority::InverseDistance => priority::<false, true>(self, at, heights, deviation, word),
         };
         match &self.weights {
-            Some(weights) if number > 0.0 => number * weights.of(&self.extent(item), slopes),
+            Some(weights) if number > 0.0 => number * weights.of(&self.extent(item), slopes.unwrap_or(Slopes::EMPTY)),
             _ => number,
         }
     }
@@ -127,12 +127,6 @@ pub(super) struct Item {
 }
 
 impl Item {
-    /// Level of the cell whose diagonal or side the base is; steps are half a sample.
-    #[inline]
-    pub(super) fn unit_level(&self, shift: u8) -> u8 {
-        Cell::MAX_LEVEL - 1 - shift - (self.word >> 3 & 15) as u8
-    }
-
     /// Bits of a record's number.
     pub(super) const RECORD_BITS: u32 = 25;
 
@@ -142,8 +136,8 @@ impl Item {
     }
 }
 
-/// Entries of a list: what may be split, what may be merged, what would be split if that were allowed, and what is not there. What is not split is
-/// even.
+/// Entries of a list: what may be split, what may be merged, what would be split if that were allowed, and what is not there. An item says only whether it
+/// may ever be split; the others are told by the sign of its number, and by whether that is one.
 pub(super) const SPLIT: u8 = 0;
 pub(super) const MERGE: u8 = 1;
 pub(super) const STUCK: u8 = 2;
@@ -153,6 +147,7 @@ pub(super) const NOWHERE: u8 = 3;
 #[derive(Clone, Debug, Default)]
 pub(super) struct List {
     items: Vec<Item>,
+    /// None, or as many.
     slopes: Vec<Slopes>,
     /// Priorities, as last measured, with the sign bit set for what may be merged; NaN where there is no entry.
     numbers: Vec<f32>,
@@ -172,35 +167,32 @@ impl List {
     }
 
     /// Adds one; returns where.
-    pub(super) fn add(&mut self, item: Item, slopes: Slopes, priority: f32) -> u32 {
-        let number = marked(priority, item.word);
+    pub(super) fn add(&mut self, item: Item, slopes: Option<Slopes>, priority: f32, kind: u8) -> u32 {
+        let number = marked(priority, kind);
         let Some(place) = self.left.pop() else {
             self.items.push(item);
-            self.slopes.push(slopes);
+            self.slopes.extend(slopes);
             self.numbers.push(number);
             return self.items.len() as u32 - 1;
         };
         self.items[place as usize] = item;
-        self.slopes[place as usize] = slopes;
+        if let Some(slopes) = slopes {
+            self.slopes[place as usize] = slopes;
+        }
         self.numbers[place as usize] = number;
         place
     }
 
     /// Makes an entry one of another kind.
     pub(super) fn turn(&mut self, place: u32, kind: u8) {
-        let word = &mut self.items[place as usize].word;
-        *word = *word & !3 | u32::from(kind);
         let number = &mut self.numbers[place as usize];
-        *number = marked(number.abs(), *word);
+        *number = marked(number.abs(), kind);
     }
 
     /// Removes one.
     pub(super) fn remove(&mut self, place: u32) {
-        let i = place as usize;
-        // Nothing that is compared with NaN is true, and what is computed from it stays so.
-        self.items[i].deviation = f32::NAN;
-        self.items[i].word |= u32::from(NOWHERE);
-        self.numbers[i] = f32::NAN;
+        // Nothing that is compared with NaN is true, and it stays so when it is measured.
+        self.numbers[place as usize] = f32::NAN;
         self.left.push(place);
     }
 
@@ -221,12 +213,11 @@ impl List {
         &self.items[place as usize]
     }
 
-    /// Begins to load an entry.
+    /// Begins to load what turning or removing an entry asks for.
     #[inline]
     pub(super) fn expect(&self, place: u32) {
-        if let Some(item) = self.items.get(place as usize) {
-            prefetch(item);
-            prefetch(&self.numbers[place as usize]);
+        if let Some(number) = self.numbers.get(place as usize) {
+            prefetch(number);
         }
     }
 
@@ -236,6 +227,7 @@ impl List {
         for depth in 3..6 {
             if let Some(&place) = self.left.iter().nth_back(depth) {
                 self.expect(place);
+                prefetch(&self.items[place as usize]);
             }
         }
     }
@@ -246,14 +238,45 @@ impl List {
         self.items.iter().map(|item| item.word >> (32 - Item::RECORD_BITS))
     }
 
-    /// Measures all whose number lies in `part`.
-    pub(super) fn measure(&mut self, ground: &impl Ground, lens: &Lens, part: std::ops::Range<usize>) {
-        ground.measure(lens, &self.items[part.clone()], &self.slopes[part.clone()], &mut self.numbers[part]);
+    /// Measures those whose place lies in `part`, and finds the places of what may be split and of what may be merged whose priority is then above one
+    /// number and not above another.
+    pub(super) fn measure(
+        &mut self,
+        ground: &impl Ground,
+        lens: &Lens,
+        part: std::ops::Range<usize>,
+        splits: Between,
+        merges: Between,
+        found: [&mut Vec<u32>; 2],
+    ) {
+        let [found_splits, found_merges] = found;
+        found_splits.clear();
+        found_merges.clear();
+        // A few at a time: they are looked at while they are near.
+        for first in (0..self.items.len()).step_by(1024) {
+            let end = (first + 1024).min(self.items.len());
+            let due = first.max(part.start)..end.min(part.end);
+            if !due.is_empty() {
+                let slopes = self.slopes.get(due.clone()).unwrap_or_default();
+                ground.measure(lens, &self.items[due.clone()], slopes, &mut self.numbers[due]);
+            }
+            find(&self.numbers[first..end], first as u32, splits, merges, found_splits, found_merges);
+        }
+        found_splits.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
+    }
+
+    /// The same, as they were measured last.
+    pub(super) fn find(&self, splits: Between, merges: Between, found: [&mut Vec<u32>; 2]) {
+        let [found_splits, found_merges] = found;
+        found_splits.clear();
+        found_merges.clear();
+        find(&self.numbers, 0, splits, merges, found_splits, found_merges);
+        found_splits.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
     }
 
     /// Greatest priority of what is not split.
     pub(super) fn worst(&self) -> f32 {
-        worst(&self.numbers)
+        greatest(&self.numbers, f32::INFINITY)
     }
 
     /// Whether anything above `tolerance` that is not split is partly void.
@@ -261,18 +284,9 @@ impl List {
         let void = |(number, item): (&f32, &Item)| *number > tolerance && item.deviation == f32::INFINITY;
         self.numbers.iter().zip(&self.items).any(void)
     }
-
-    /// Puts the places of those of a kind whose priority is above `above` and not above `most` into `found`.
-    pub(super) fn within(&self, kind: u8, above: f32, most: f32, found: &mut Vec<u32>) {
-        found.clear();
-        within(&self.numbers, kind == MERGE, above, most, found);
-        if kind == SPLIT {
-            found.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
-        }
-    }
 }
 
-/// Measures many; the number of one that may be merged has its sign bit set.
+/// Measures many anew: numbers keep their signs, and what is none stays so.
 pub(super) fn measure(lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {
     match lens.priority {
         Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
@@ -301,17 +315,61 @@ fn measure_distances(lens: &Lens, items: &[Item], out: &mut [f32]) {
     measure_one_by_one::<false, false>(lens, items, out);
 }
 
+/// Measures many that have the same word, and no sign.
+pub(super) fn measure_alike(lens: &Lens, word: u32, at: &[u32], heights: &[u32], deviations: &[f32], out: &mut [f32]) {
+    match lens.priority {
+        Priority::ScreenError if lens.voids => alike_errors_and_voids(lens, word, at, heights, deviations, out),
+        Priority::ScreenError => alike_errors(lens, word, at, heights, deviations, out),
+        Priority::InverseDistance => alike_distances(lens, word, at, heights, deviations, out),
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn alike_errors(lens: &Lens, word: u32, at: &[u32], heights: &[u32], deviations: &[f32], out: &mut [f32]) {
+    alike::<true, false>(lens, word, at, heights, deviations, out);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn alike_errors_and_voids(lens: &Lens, word: u32, at: &[u32], heights: &[u32], deviations: &[f32], out: &mut [f32]) {
+    alike::<true, true>(lens, word, at, heights, deviations, out);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn alike_distances(lens: &Lens, word: u32, at: &[u32], heights: &[u32], deviations: &[f32], out: &mut [f32]) {
+    alike::<false, false>(lens, word, at, heights, deviations, out);
+}
+
+#[inline(always)]
+fn alike<const ERRORS: bool, const VOIDS: bool>(
+    lens: &Lens,
+    word: u32,
+    at: &[u32],
+    heights: &[u32],
+    deviations: &[f32],
+    out: &mut [f32],
+) {
+    for (((out, &at), &heights), &deviation) in out.iter_mut().zip(at).zip(heights).zip(deviations) {
+        *out = priority::<ERRORS, VOIDS>(lens, at, heights, deviation, word);
+    }
+}
+
 #[inline(always)]
 fn measure_one_by_one<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
     for (out, &Item { at, heights, deviation, word }) in out.iter_mut().zip(items) {
-        *out = marked(priority::<ERRORS, VOIDS>(lens, at, heights, deviation, word), word);
+        *out = renewed(priority::<ERRORS, VOIDS>(lens, at, heights, deviation, word), *out);
     }
 }
 
 /// The number kept of a priority that is not negative.
 #[inline(always)]
-pub(super) fn marked(priority: f32, word: u32) -> f32 {
-    f32::from_bits(priority.to_bits() | word << 31)
+fn marked(priority: f32, kind: u8) -> f32 {
+    f32::from_bits(priority.to_bits() | u32::from(kind == MERGE) << 31)
+}
+
+/// The number kept of a priority in the place of one that was.
+#[inline(always)]
+pub(super) fn renewed(priority: f32, number: f32) -> f32 {
+    if number.is_nan() { number } else { f32::from_bits(priority.to_bits() | number.to_bits() & 1 << 31) }
 }
 
 #[inline(always)]
@@ -400,42 +458,142 @@ pub(super) fn priority_of_box<const ERRORS: bool, const VOIDS: bool>(
         let (gx, gy, gz) = (gap(x0, x1), gap(y0, y1), gap(z0, z1));
         1.0 / (most(View::NEAR, (gx * gx + gy * gy + gz * gz).sqrt()))
     };
-    let number = if seen { number } else { 0.0 };
-    // What is not there has none.
-    if deviation.is_nan() { f32::NAN } else { number }
+    if seen { number } else { 0.0 }
 }
 
+/// The greatest of the numbers that are no greater than `limit`; 0 if none of them is positive.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn worst(numbers: &[f32]) -> f32 {
+pub(super) fn greatest(numbers: &[f32], limit: f32) -> f32 {
     let mut greatest = [0.0f32; LANES];
     let chunks = numbers.chunks_exact(LANES);
     let rest = chunks.remainder();
     for numbers in chunks {
         for lane in 0..LANES {
-            greatest[lane] = most(numbers[lane], greatest[lane]);
+            let number = if numbers[lane] <= limit { numbers[lane] } else { 0.0 };
+            greatest[lane] = most(number, greatest[lane]);
         }
     }
-    rest.iter().chain(&greatest).fold(0.0, |a, &b| most(b, a))
+    rest.iter().filter(|number| **number <= limit).chain(&greatest).fold(0.0, |a, &b| most(b, a))
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn within(numbers: &[f32], marked: bool, above: f32, most: f32, found: &mut Vec<u32>) {
+/// Priorities above one number and not above another, by their bits: those of numbers that are not negative sort like them, and before all others.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Between {
+    low: u32,
+    span: u32,
+}
+
+impl Between {
+    pub(super) const NONE: Between = Between { low: u32::MAX >> 1, span: 0 };
+
+    pub(super) fn new(above: f32, most: f32) -> Between {
+        let low = if above >= 0.0 { above.to_bits() + 1 } else { 0 };
+        let span = if most >= 0.0 { most.to_bits().checked_sub(low) } else { None };
+        span.map_or(Between::NONE, |span| Between { low, span })
+    }
+}
+
+/// Puts where numbers are whose priority is among those asked for, of those without and of those with the sign bit, into `splits` and `merges`; the first is
+/// at `first`.
+fn find(
+    numbers: &[f32],
+    first: u32,
+    positive: Between,
+    negative: Between,
+    splits: &mut Vec<u32>,
+    merges: &mut Vec<u32>,
+) {
+    let negative = Between { low: negative.low ^ 1 << 31, ..negative };
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx512f") {
+        // SAFETY: the processor has what the function was compiled for.
+        return unsafe { find_wide(numbers, first, positive, negative, splits, merges) };
+    }
+    find_portable(numbers, first, positive, negative, splits, merges);
+}
+
+/// Compilers make of such masks five times as many instructions.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn find_wide(
+    numbers: &[f32],
+    first: u32,
+    positive: Between,
+    negative: Between,
+    splits: &mut Vec<u32>,
+    merges: &mut Vec<u32>,
+) {
+    use std::arch::x86_64::{_mm512_cmple_epu32_mask, _mm512_loadu_epi32, _mm512_set1_epi32, _mm512_sub_epi32};
+    let [low, span, other, other_span] =
+        [positive.low, positive.span, negative.low, negative.span].map(|bits| _mm512_set1_epi32(bits.cast_signed()));
     let chunks = numbers.chunks_exact(LANES);
-    let (rest, mut first) = (chunks.remainder(), 0);
-    let fits = |number: f32| {
-        let p = number.abs();
-        u32::from(p > above) & u32::from(p <= most) & u32::from((number.to_bits() >> 31 == 1) == marked)
-    };
+    let (rest, mut first) = (chunks.remainder(), first);
     for numbers in chunks {
-        let mut mask = 0u32;
-        for (lane, &number) in numbers.iter().enumerate() {
-            mask |= fits(number) << lane;
+        // SAFETY: it reads the sixteen numbers of the chunk, wherever they lie.
+        let bits = unsafe { _mm512_loadu_epi32(numbers.as_ptr().cast()) };
+        let mut split = _mm512_cmple_epu32_mask(_mm512_sub_epi32(bits, low), span);
+        let mut merge = _mm512_cmple_epu32_mask(_mm512_sub_epi32(bits, other), other_span);
+        while split != 0 {
+            splits.push(first + split.trailing_zeros());
+            split &= split - 1;
         }
-        while mask != 0 {
-            found.push(first + mask.trailing_zeros());
-            mask &= mask - 1;
+        while merge != 0 {
+            merges.push(first + merge.trailing_zeros());
+            merge &= merge - 1;
         }
         first += LANES as u32;
     }
-    found.extend(rest.iter().zip(first..).filter(|(number, _)| fits(**number) == 1).map(|(_, place)| place));
+    find_portable(rest, first, positive, negative, splits, merges);
+}
+
+fn find_portable(
+    numbers: &[f32],
+    first: u32,
+    positive: Between,
+    negative: Between,
+    splits: &mut Vec<u32>,
+    merges: &mut Vec<u32>,
+) {
+    for (number, place) in numbers.iter().zip(first..) {
+        let bits = number.to_bits();
+        if bits.wrapping_sub(positive.low) <= positive.span {
+            splits.push(place);
+        }
+        if bits.wrapping_sub(negative.low) <= negative.span {
+            merges.push(place);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is found is what was asked for, by both kernels.
+    #[test]
+    fn numbers_between_two_are_found() {
+        let some = [0.0, -0.0, f32::MIN_POSITIVE, 1.0, 1.5, 2.0, 3.0, f32::INFINITY, f32::NAN];
+        let numbers: Vec<f32> = (0..75).map(|i| if i % 7 < 4 { some[i % 9] } else { -some[i % 9] }).collect();
+        for above in [-1.0, 0.0, 1.0, 1.5, 2.0, f32::INFINITY] {
+            for most in [-1.0, 0.0, 1.0, 2.0, 3.0, f32::INFINITY] {
+                let expected = |negative: bool| -> Vec<u32> {
+                    let fits = |n: f32| n.is_sign_negative() == negative && n.abs() > above && n.abs() <= most;
+                    (0..).zip(&numbers).filter(|(_, n)| fits(**n)).map(|(i, _)| i + 5).collect()
+                };
+                let between = Between::new(above, most);
+                for (one, other) in [(between, Between::NONE), (Between::NONE, between), (between, between)] {
+                    let (mut splits, mut merges) = (Vec::new(), Vec::new());
+                    find(&numbers, 5, one, other, &mut splits, &mut merges);
+                    let wanted = |part: Between, negative| {
+                        if part.span == 0 && part.low == Between::NONE.low { Vec::new() } else { expected(negative) }
+                    };
+                    assert_eq!((&splits, &merges), (&wanted(one, false), &wanted(other, true)), "{above} {most}");
+                    let (mut portable, mut portable_merges) = (Vec::new(), Vec::new());
+                    let flipped = Between { low: other.low ^ 1 << 31, ..other };
+                    find_portable(&numbers, 5, one, flipped, &mut portable, &mut portable_merges);
+                    assert_eq!((splits, merges), (portable, portable_merges), "{above} {most}");
+                }
+            }
+        }
+    }
 }

@@ -61,7 +61,7 @@ impl<G: Ground> RoamFlight<'_, G> {
     }
 
     /// Adds a triangle of a diamond.
-    #[inline]
+    #[inline(always)]
     pub(super) fn put(&mut self, record: u32, side: usize, triangle: [u32; 3]) {
         let owner = 2 * record + side as u32;
         let slot = match self.freed.pop() {

@@ -36,22 +36,28 @@ impl<G: Ground> RoamFlight<'_, G> {
             1 => {
                 known.parents.iter().for_each(|&parent| self.expect_record(parent));
                 known.triangles.iter().for_each(|&slot| self.expect_triangle(slot));
-                self.bounds.expect(diamond);
+                self.bounds.expect_height(known.at);
                 self.list.expect(known.place);
             }
             2 => {
                 for parent in known.parents {
-                    if let Some(parent) = self.records.get(parent as usize) {
+                    if let Some(parent) = self.records.get(parent as usize).filter(|parent| parent.list == MERGE) {
                         self.list.expect(parent.place);
                     }
                 }
                 (0..4).for_each(|child| self.expect_record(self.beyond(known, diamond, child).0));
             }
             _ => {
-                for child in 0..4 {
-                    let (other, back) = self.beyond(known, diamond, child);
-                    if let Some(other) = self.records.get(other as usize) {
-                        self.expect_record(other.children[back]);
+                for (i, child) in diamond.children().into_iter().enumerate() {
+                    let Some(child) = child else { continue };
+                    let (other, back) = self.beyond(known, diamond, i);
+                    match self
+                        .records
+                        .get(other as usize)
+                        .and_then(|other| self.records.get(other.children[back] as usize))
+                    {
+                        Some(there) => prefetch(there),
+                        None => self.bounds.expect_bound(child),
                     }
                 }
             }
@@ -67,7 +73,7 @@ impl<G: Ground> RoamFlight<'_, G> {
             }
         }
         if let Some(vertex) =
-            self.unused_vertices.iter().nth_back(2).and_then(|&at| self.mesh.vertices.get(at as usize))
+            self.unused_vertices.iter().nth_back(4).and_then(|&at| self.mesh.vertices.get(at as usize))
         {
             prefetch(vertex);
         }
@@ -79,6 +85,8 @@ impl<G: Ground> RoamFlight<'_, G> {
     pub(super) fn foresee_child(&self, record: u32) {
         self.foresee_split(record, 1);
         self.foresee_split(record, 2);
+        let children = Diamond::at(self.records[record as usize].at).children();
+        children.into_iter().flatten().for_each(|child| self.bounds.expect_bound(child));
     }
 
     /// One hop of what the merge of a record asks for.
@@ -93,15 +101,14 @@ impl<G: Ground> RoamFlight<'_, G> {
             self.list.expect(known.place);
             return;
         }
-        for parent in known.parents {
-            if let Some(parent) = self.records.get(parent as usize) {
-                self.list.expect(parent.place);
-            }
-        }
-        for child in known.children {
-            if let Some(child) = self.records.get(child as usize) {
+        for (i, child) in known.children.into_iter().enumerate() {
+            let Some(child) = self.records.get(child as usize) else { continue };
+            if child.list != NOWHERE {
                 self.list.expect(child.place);
-                child.triangles.iter().for_each(|&slot| self.expect_triangle(slot));
+            }
+            // What is freed last is taken first.
+            if i >= 2 {
+                self.expect_triangle(child.triangles[usize::from(child.parents[0] != record)]);
             }
         }
     }

@@ -46,8 +46,10 @@ const SOON: usize = 256;
 pub(super) struct Queue {
     /// In rising order; empty only if `rest` is.
     sorted: Vec<Key>,
-    /// None of it is greater than any that is sorted.
+    /// None of it is greater than any that is sorted …
     rest: Vec<Key>,
+    /// … and none before one of these places than any behind it.
+    parts: Vec<usize>,
     later: BinaryHeap<Key>,
 }
 
@@ -55,6 +57,7 @@ impl Queue {
     pub fn clear(&mut self) {
         self.sorted.clear();
         self.rest.clear();
+        self.parts.clear();
         self.later.clear();
     }
 
@@ -66,16 +69,23 @@ impl Queue {
     fn extend(&mut self, keys: impl Iterator<Item = Key>) {
         self.rest.append(&mut self.sorted);
         self.rest.extend(keys);
+        self.parts.clear();
         self.refill();
     }
 
+    /// Sorts the next few, below what is sorted.
     fn refill(&mut self) {
-        let from = self.rest.len().saturating_sub(SOON);
-        if from > 0 {
-            self.rest.select_nth_unstable(from);
+        // By halves, which are there for the next time.
+        let mut from = self.parts.last().copied().unwrap_or(0);
+        while self.rest.len() - from > SOON {
+            let half = (self.rest.len() - from) / 2;
+            self.rest[from..].select_nth_unstable(half);
+            from += half;
+            self.parts.push(from);
         }
-        self.sorted.extend(self.rest.drain(from..));
-        self.sorted.sort_unstable();
+        self.parts.pop();
+        self.rest[from..].sort_unstable();
+        self.sorted.splice(0..0, self.rest.drain(from..));
     }
 
     fn peek(&self) -> Option<Key> {
@@ -88,9 +98,14 @@ impl Queue {
             return;
         }
         self.sorted.pop();
-        if self.sorted.is_empty() {
+        if self.sorted.len() <= AHEAD[0] && !self.rest.is_empty() {
             self.refill();
         }
+    }
+
+    /// The last of the next few hundred, if there are more.
+    fn urgent(&self) -> Option<Key> {
+        self.rest[self.parts.last().copied()?..].iter().min().copied()
     }
 
     /// What comes `steps` after the next, as far as that is known.
@@ -131,20 +146,33 @@ impl<G: Ground> RoamFlight<'_, G> {
     /// Makes the band wider and takes what it holds into the queues.
     fn widen(&mut self, low: f32, high: f32) {
         let (low, high) = (low.min(self.band.0), high.max(self.band.1));
+        let (splits, merges) = (Between::new(low.max(self.tolerance), self.band.0), Between::new(self.band.1, high));
+        self.list.find(splits, merges, [&mut self.found, &mut self.found_merges]);
+        self.enter(low, high);
+    }
+
+    /// Takes what was found in a band into the queues.
+    pub(super) fn enter(&mut self, low: f32, high: f32) {
         let (list, bounds) = (&self.list, &self.bounds);
         let key = |&place: &u32| {
             let at = bounds.middle(list.item(place));
             Key::new(list.priority(place), Diamond::at(at), list.record(place))
         };
-        if low < self.band.0 {
-            list.within(SPLIT, low.max(self.tolerance), self.band.0, &mut self.found);
+        if !self.found.is_empty() {
             self.splits.extend(self.found.iter().map(key));
+            self.foresee_first_splits();
         }
-        if high > self.band.1 {
-            list.within(MERGE, self.band.1, high, &mut self.found);
-            self.merges.extend(self.found.iter().map(|place| key(place).reversed()));
+        if !self.found_merges.is_empty() {
+            self.merges.extend(self.found_merges.iter().map(|place| key(place).reversed()));
+            self.foresee_first_merges();
         }
         self.band = (low, high);
+    }
+
+    /// The band that a frame needs that is not stopped.
+    pub(super) fn whole_band(&self) -> (f32, f32) {
+        let border = self.border.max(self.tolerance);
+        ((border / BAND).max(self.tolerance), border * BAND)
     }
 
     /// The next that is to be split, and the next that is to be merged.
@@ -165,7 +193,11 @@ impl<G: Ground> RoamFlight<'_, G> {
     pub(super) fn balance(&mut self, stop: &mut dyn FnMut() -> bool) -> bool {
         let (budget, tolerance) = (self.budget(), self.tolerance);
         let border = self.border.max(tolerance);
-        self.widen((border / BAND).max(tolerance), (border * BAND).max(tolerance));
+        let (low, high) = self.whole_band();
+        let mut pressed = self.urgent.is_some();
+        if !pressed && self.band.1 < 0.0 {
+            self.widen(low, high);
+        }
         let mut wider = BAND;
         let mut steps = 0u32;
         let mut stopped = false;
@@ -177,6 +209,16 @@ impl<G: Ground> RoamFlight<'_, G> {
                 break;
             }
             let (top, last) = self.next();
+            let agreed = matches!((top, last), (Some(top), Some(last)) if top < last) && self.triangles + 1 >= budget;
+            if pressed && (agreed || top.is_none() || last.is_none()) {
+                // There is time for what is less urgent.
+                pressed = false;
+                self.splits.clear();
+                self.merges.clear();
+                self.band = (f32::INFINITY, -1.0);
+                self.widen(low, high);
+                continue;
+            }
             let merging = match (top, last) {
                 _ if self.triangles > budget => true,
                 // Nothing is split that need not be; but first comes what is missing, lest a stopped frame only lose triangles.
@@ -225,6 +267,13 @@ impl<G: Ground> RoamFlight<'_, G> {
                 }
             }
         }
+        self.urgent = stopped.then(|| {
+            let (low, high) =
+                (self.splits.urgent().map(Key::number), self.merges.urgent().map(|key| key.reversed().number()));
+            // Where there were few, rather some more.
+            let before = if pressed { self.band } else { (0.0, f32::INFINITY) };
+            (low.unwrap_or(before.0 / 1.1), high.unwrap_or(before.1 * 1.1))
+        });
         if !stopped {
             let (top, last) = self.next();
             self.border = top.or(last).map_or(border, Key::number).max(tolerance);
@@ -250,6 +299,22 @@ impl<G: Ground> RoamFlight<'_, G> {
             if let Some(key) = self.merges.coming(ahead) {
                 self.foresee_merge(key.reversed().record(), hop);
             }
+        }
+    }
+
+    /// What the first splits ask for, so far as later ones will have been foreseen when they are next.
+    fn foresee_first_splits(&self) {
+        for (hop, ahead) in AHEAD.into_iter().enumerate() {
+            let first = (0..ahead).map_while(|step| self.splits.coming(step));
+            first.for_each(|key| self.foresee_split(key.record(), hop));
+        }
+    }
+
+    /// The same for merges.
+    fn foresee_first_merges(&self) {
+        for (hop, ahead) in AHEAD.into_iter().take(3).enumerate() {
+            let first = (0..ahead).map_while(|step| self.merges.coming(step));
+            first.for_each(|key| self.foresee_merge(key.reversed().record(), hop));
         }
     }
 }

@@ -18,7 +18,7 @@
 //! Works this rests on: M. Duchaineau et al., "ROAMing terrain: real-time optimally adapting meshes", 1997; spec page of 1999.
 
 use super::super::factors::Slopes;
-use super::super::scan::{Extent, around, marked, priority_of_box};
+use super::super::scan::{Extent, around, priority_of_box, renewed};
 use super::super::scratch::Order;
 use super::*;
 use crate::field::{HeightField, Sea};
@@ -80,7 +80,7 @@ impl Waves {
     #[inline(always)]
     fn number<const ERRORS: bool>(&self, lens: &Lens, item: &Item) -> f32 {
         let level = item.deviation;
-        let deviation = if level.is_nan() { f32::NAN } else { self.deviations[(level.to_bits() & 63) as usize] };
+        let deviation = self.deviations[(level.to_bits() & 63) as usize];
         priority_of_box::<ERRORS, false>(lens, self.extent(lens, item), true, deviation)
     }
 
@@ -99,12 +99,12 @@ impl Waves {
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn measure_errors(waves: &Waves, lens: &Lens, items: &[Item], out: &mut [f32]) {
-    out.iter_mut().zip(items).for_each(|(out, item)| *out = marked(waves.number::<true>(lens, item), item.word));
+    out.iter_mut().zip(items).for_each(|(out, item)| *out = renewed(waves.number::<true>(lens, item), *out));
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 fn measure_distances(waves: &Waves, lens: &Lens, items: &[Item], out: &mut [f32]) {
-    out.iter_mut().zip(items).for_each(|(out, item)| *out = marked(waves.number::<false>(lens, item), item.word));
+    out.iter_mut().zip(items).for_each(|(out, item)| *out = renewed(waves.number::<false>(lens, item), *out));
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
@@ -139,8 +139,8 @@ impl Ground for Waves {
     }
 
     #[inline]
-    fn slopes(&self, _: Diamond) -> Slopes {
-        Slopes::EMPTY
+    fn slopes(&self, _: Diamond) -> Option<Slopes> {
+        None
     }
 
     /// The middle takes the room of the heights, and the level that of the deviation.
@@ -162,13 +162,15 @@ impl Ground for Waves {
     }
 
     #[inline]
-    fn priority(&self, lens: &Lens, item: &Item, slopes: Slopes) -> f32 {
+    fn priority(&self, lens: &Lens, item: &Item, slopes: Option<Slopes>) -> f32 {
         let number = match lens.priority {
             Priority::ScreenError => self.number::<true>(lens, item),
             Priority::InverseDistance => self.number::<false>(lens, item),
         };
         match &lens.weights {
-            Some(weights) if number > 0.0 => number * weights.of(&self.extent(lens, item), slopes),
+            Some(weights) if number > 0.0 => {
+                number * weights.of(&self.extent(lens, item), slopes.unwrap_or(Slopes::EMPTY))
+            }
             _ => number,
         }
     }
@@ -188,7 +190,10 @@ impl Ground for Waves {
     }
 
     #[inline]
-    fn expect(&self, _: Diamond) {}
+    fn expect_height(&self, _: Point) {}
+
+    #[inline]
+    fn expect_bound(&self, _: Diamond) {}
 
     #[inline]
     fn forget(&mut self, vertex: u32) {

@@ -189,6 +189,7 @@ proptest! {
         views in prop::collection::vec(((-0.5f64..1.5, -0.5f64..1.5, -20f64..120.0), (0f64..6.3, -1.5f64..0.5)), 1..6),
         distance in any::<bool>(),
         factors in prop_oneof![Just(None), factors().prop_map(Some)],
+        stops in any::<bool>(),
     ) {
         let (columns, rows) = side;
         let filled = |h: &f32| if flat { 7.0 } else if h.is_nan() && !holes { 0.0 } else { *h };
@@ -206,6 +207,10 @@ proptest! {
             let ahead = DVec3::new(yaw.cos() * pitch.cos(), yaw.sin() * pitch.cos(), pitch.sin());
             let mut view = View::looking_at(eye, eye + ahead, 1.0, UVec2::new(320, 200));
             view.tolerance_pixels = tolerance;
+            if stops {
+                // What a stopped frame leaves undone is done by the next.
+                flight.update(&view, &mut || true).expect("a view");
+            }
             let before = (split_set(&flight), flight.operations());
             let reached = flight.update(&view, &mut || false).expect("a view");
             let (triangles, worst) = algorithm_one(&flight);
