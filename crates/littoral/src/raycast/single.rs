@@ -149,38 +149,29 @@ struct Tables {
     /// The part of a node's index in its block that the column makes.
     nodes: Rows,
     /// The part of a sample's index among 8 to a line that the major axis makes, on this side along x and on the other.
-    samples: [Indices; 2],
-    /// Column and row of the pieces of the way through 4 × 4 patches.
-    columns: Eight,
-    rows: Eight,
+    samples: [Rows; 2],
+    /// Column and row of the pieces of the way through 4 × 4 patches, twice.
+    columns: Columns,
+    rows: Columns,
     one: f32,
     four: i32,
     eight: i32,
     word: i32,
 }
 
-/// Eight numbers.
-#[repr(align(32))]
-#[derive(Clone, Copy, Debug)]
-struct Eight([f32; 8]);
-
 /// Rows of the nodes of a block along the way, column after column: entered, left.
 #[repr(align(64))]
 #[derive(Clone, Copy, Debug)]
 struct Rows([i32; 16]);
-
-#[repr(align(32))]
-#[derive(Clone, Copy, Debug)]
-struct Indices([i32; 8]);
 
 /// By (major axis is y) · 4 + (y, x mirrored).
 static TABLES: [Tables; 8] = {
     let mut tables = [const {
         Tables {
             nodes: Rows([0; 16]),
-            samples: [Indices([0; 8]); 2],
-            columns: Eight([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]),
-            rows: Eight([0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]),
+            samples: [Rows([0; 16]); 2],
+            columns: Columns([0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]),
+            rows: Columns([0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]),
             one: 1.0,
             four: 4,
             eight: 8,
@@ -195,7 +186,8 @@ static TABLES: [Tables; 8] = {
             let column = lane as i32 / 2;
             tables[table].nodes.0[lane] = (if table & 4 == 0 { column } else { 8 * column }) ^ mirror;
             let mut side = 0;
-            while side < 2 && lane < 8 {
+            while side < 2 {
+                let column = column % 4;
                 let mirrored = table & 1 != 0;
                 tables[table].samples[side].0[lane] = if table & 4 == 0 {
                     if mirrored { 4 - column - side as i32 } else { column + side as i32 }
@@ -243,18 +235,17 @@ trait Looks: Copy {
         frame: *mut Frame,
     ) -> u32;
 
-    /// The first hit within the 4 × 4 patches of a node: its first column (cells), its row, and what it is of the raster's.
-    #[allow(clippy::too_many_arguments, reason = "numbers that come in registers, not as one thing in memory")]
-    fn patches<const X: bool>(
-        self,
-        land: &Single,
-        octant: &Octant,
-        way: &Way,
-        first: &f32,
-        node: &i32,
-        x: usize,
-        y: usize,
-    ) -> Option<Met>;
+    /// The first hit within the 4 × 4 patches of two nodes, one after the other, which may be the same.
+    fn patches<const X: bool>(self, land: &Single, octant: &Octant, way: &Way, nodes: [Node; 2]) -> Option<Met>;
+}
+
+/// A node of the first level: where its columns begin (cells), its row, and what it is of the raster's.
+#[derive(Clone, Copy)]
+struct Node<'a> {
+    first: &'a f32,
+    row: &'a i32,
+    x: usize,
+    y: usize,
 }
 
 impl<'a> Single<'a> {
@@ -481,7 +472,18 @@ impl<'a> Single<'a> {
                                 continue 'blocks;
                             }
                         }
-                        if let Some(met) = looks.patches::<X>(self, octant, &way, column, row, x, y) {
+                        // The next one, if there is one, is looked at as well: mostly the ray gets there.
+                        let other = if mask == 0 { lane } else { mask.trailing_zeros() as usize };
+                        mask &= mask.wrapping_sub(1);
+                        // SAFETY: as above.
+                        let other = unsafe {
+                            let first = &*(&raw const (*frame).columns).cast::<f32>().add(other);
+                            let row = &*(&raw const (*frame).rows).cast::<i32>().add(other);
+                            let [x, y] = (*floor).raster::<X>(octant, [(*frame).node[0] + other as i32 / 2, *row]);
+                            Node { first, row, x, y }
+                        };
+                        let nodes = [Node { first: column, row, x, y }, other];
+                        if let Some(met) = looks.patches::<X>(self, octant, &way, nodes) {
                             let distance = more((met.s - major.x) * inverse_major.x, 0.0);
                             return if met.below { f32::NAN } else { distance };
                         }
@@ -617,72 +619,76 @@ impl Looks for Portable {
     }
 
     #[inline(always)]
-    fn patches<const X: bool>(
-        self,
-        land: &Single,
-        octant: &Octant,
-        way: &Way,
-        first: &f32,
-        node: &i32,
-        x: usize,
-        y: usize,
-    ) -> Option<Met> {
-        let (west, south) = (4 * x, 4 * y);
-        let ((row_at, slope), inverse) = (way.row::<X>(), way.inverse_slope::<X>());
-        let mirror = if X { octant.mirror } else { [octant.mirror[1], octant.mirror[0]] };
-        for lane in 0..8 {
-            let major = lane / 2;
-            let column = major as f32 + first;
-            let (enter, leave) = (more(column, way.start), less(column + 1.0, way.end));
-            // Where the line beyond a row is crossed.
-            let crossing = |row: f32| less((row - row_at).mul_add(inverse, inverse), leave);
-            let row = slope.mul_add(enter, row_at).floor();
-            let (a, row) = if lane & 1 == 0 { (enter, row) } else { (crossing(row), row + 1.0) };
-            let b = crossing(row);
-            let minor = (row as i32).wrapping_sub(4 * node);
-            if !(a < b && (0..4).contains(&minor)) {
-                continue;
-            }
-            let [i, j] = if X { [major, minor] } else { [minor, major] };
-            // The patch of the raster; its nearest sample is its first, or its last along a mirrored axis.
-            let (x, y) = (west as i32 + (i ^ mirror[0] & 3), south as i32 + (j ^ mirror[1] & 3));
-            if x >= land.patches[0] || y >= land.patches[1] {
-                continue;
-            }
-            let sample = |i: i32, j: i32| {
-                let (x, y) = (x + (i ^ mirror[0] & 1), y + (j ^ mirror[1] & 1));
-                land.heights[y as usize * land.columns + x as usize]
-            };
-            let corner = sample(0, 0);
-            let (next, aside) = if X { (sample(1, 0), sample(0, 1)) } else { (sample(0, 1), sample(1, 0)) };
-            let (rise, across) = (next - corner, aside - corner);
-            let twist = (sample(1, 1) - aside) - rise;
-            let over = |s: f32| {
-                let (u, v) = (s - column, slope.mul_add(s, row_at - row));
-                let z = (-u).mul_add(rise, way.rate.z.mul_add(s, way.at.z - corner));
-                (-v).mul_add(twist.mul_add(u, across), z)
-            };
-            let (f0, f1) = (over(a), over(b));
-            let length = b - a;
-            let bend = (twist * slope) * (length * length);
-            // Between two points above it the ray can only dip where both are nearer than the bend.
-            let bend = 0.0 - bend;
-            let near = more(0.0, bend);
-            let lowest = less(f0, f1);
-            if lowest.is_nan() || lowest > near {
-                continue;
-            }
-            let slope = (f1 - f0) - bend;
-            let disc = slope.mul_add(slope, -((4.0 * bend) * f0));
-            let dips = slope < 0.0 && slope + (bend + bend) > 0.0 && disc >= 0.0;
-            if lowest > 0.0 && !dips {
-                continue;
-            }
-            let root = more(disc, 0.0).sqrt();
-            let root = if slope < 0.0 { (f0 + f0) / (root - slope) } else { (slope + root) / (-2.0 * bend) };
-            let root = if f0 > 0.0 { less(root, 1.0) } else { 0.0 };
-            return Some(Met { s: root.mul_add(length, a), below: f0 < 0.0 });
-        }
-        None
+    fn patches<const X: bool>(self, land: &Single, octant: &Octant, way: &Way, nodes: [Node; 2]) -> Option<Met> {
+        let [this, other] = nodes;
+        let met = patches_of::<X>(land, octant, way, this);
+        if met.is_some() || std::ptr::eq(this.row, other.row) { met } else { patches_of::<X>(land, octant, way, other) }
     }
+}
+
+/// The first hit within the 4 × 4 patches of a node.
+#[inline(always)]
+fn patches_of<const X: bool>(
+    land: &Single,
+    octant: &Octant,
+    way: &Way,
+    Node { first, row: node, x, y }: Node,
+) -> Option<Met> {
+    let (west, south) = (4 * x, 4 * y);
+    let ((row_at, slope), inverse) = (way.row::<X>(), way.inverse_slope::<X>());
+    let mirror = if X { octant.mirror } else { [octant.mirror[1], octant.mirror[0]] };
+    for lane in 0..8 {
+        let major = lane / 2;
+        let column = major as f32 + first;
+        let (enter, leave) = (more(column, way.start), less(column + 1.0, way.end));
+        // Where the line beyond a row is crossed.
+        let crossing = |row: f32| less((row - row_at).mul_add(inverse, inverse), leave);
+        let row = slope.mul_add(enter, row_at).floor();
+        let (a, row) = if lane & 1 == 0 { (enter, row) } else { (crossing(row), row + 1.0) };
+        let b = crossing(row);
+        let minor = (row as i32).wrapping_sub(4 * node);
+        if !(a < b && (0..4).contains(&minor)) {
+            continue;
+        }
+        let [i, j] = if X { [major, minor] } else { [minor, major] };
+        // The patch of the raster; its nearest sample is its first, or its last along a mirrored axis.
+        let (x, y) = (west as i32 + (i ^ mirror[0] & 3), south as i32 + (j ^ mirror[1] & 3));
+        if x >= land.patches[0] || y >= land.patches[1] {
+            continue;
+        }
+        let sample = |i: i32, j: i32| {
+            let (x, y) = (x + (i ^ mirror[0] & 1), y + (j ^ mirror[1] & 1));
+            land.heights[y as usize * land.columns + x as usize]
+        };
+        let corner = sample(0, 0);
+        let (next, aside) = if X { (sample(1, 0), sample(0, 1)) } else { (sample(0, 1), sample(1, 0)) };
+        let (rise, across) = (next - corner, aside - corner);
+        let twist = (sample(1, 1) - aside) - rise;
+        let over = |s: f32| {
+            let (u, v) = (s - column, slope.mul_add(s, row_at - row));
+            let z = (-u).mul_add(rise, way.rate.z.mul_add(s, way.at.z - corner));
+            (-v).mul_add(twist.mul_add(u, across), z)
+        };
+        let (f0, f1) = (over(a), over(b));
+        let length = b - a;
+        let bend = (twist * slope) * (length * length);
+        // Between two points above it the ray can only dip where both are nearer than the bend.
+        let bend = 0.0 - bend;
+        let near = more(0.0, bend);
+        let lowest = less(f0, f1);
+        if lowest.is_nan() || lowest > near {
+            continue;
+        }
+        let slope = (f1 - f0) - bend;
+        let disc = slope.mul_add(slope, -((4.0 * bend) * f0));
+        let dips = slope < 0.0 && slope + (bend + bend) > 0.0 && disc >= 0.0;
+        if lowest > 0.0 && !dips {
+            continue;
+        }
+        let root = more(disc, 0.0).sqrt();
+        let root = if slope < 0.0 { (f0 + f0) / (root - slope) } else { (slope + root) / (-2.0 * bend) };
+        let root = if f0 > 0.0 { less(root, 1.0) } else { 0.0 };
+        return Some(Met { s: root.mul_add(length, a), below: f0 < 0.0 });
+    }
+    None
 }

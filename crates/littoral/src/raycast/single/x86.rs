@@ -9,17 +9,27 @@ struct Avx512 {
     /// The odd lanes, and the lower word of each lane: in registers from the ray's beginning to its end.
     odd: __mmask16,
     words: __mmask32,
+    /// The upper half of the lanes, and the lower.
+    upper: __mmask16,
+    lower: __mmask16,
 }
 
 /// The kernel compiled for AVX-512.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
 pub(super) fn first_hit(land: &Single, ray: &LocalRay) -> f32 {
-    let (mut odd, mut words) = (0xAAAA_u16, 0x5555_5555_u32);
+    let (mut odd, mut words, mut upper, mut lower) = (0xAAAA_u16, 0x5555_5555_u32, 0xFF00_u16, 0xFF_u16);
     // SAFETY: no instruction at all; the masks stay what they are, and the compiler does not know them.
     unsafe {
-        std::arch::asm!("/* {0} {1} */", inout(kreg) odd, inout(kreg) words, options(nomem, nostack, preserves_flags));
+        std::arch::asm!(
+            "/* {0} {1} {2} {3} */",
+            inout(kreg) odd,
+            inout(kreg) words,
+            inout(kreg) upper,
+            inout(kreg) lower,
+            options(nomem, nostack, preserves_flags)
+        );
     }
-    land.walk(Avx512 { odd, words }, ray)
+    land.walk(Avx512 { odd, words, upper, lower }, ray)
 }
 
 /// The looks in plain Rust, where a · b + c is one instruction.
@@ -46,36 +56,48 @@ fn anew<T>(place: &T) -> &T {
     }
 }
 
-/// Eight numbers of a table of 32.
+/// Rows 0 to 3 and 1 to 4 of eight samples each.
+///
+/// # Safety
+/// They are there.
 #[inline(always)]
-fn pick((a, b): (__m512, __m512), index: __m256i) -> __m256 {
-    unsafe { _mm512_castps512_ps256(_mm512_permutex2var_ps(a, _mm512_castsi256_si512(index), b)) }
+unsafe fn fetch(land: &Single, octant: &Octant, corner: usize) -> [[__m512; 2]; 2] {
+    unsafe {
+        let first = land.heights.as_ptr().add(corner).offset(octant.start);
+        let row = |index: isize| _mm256_loadu_ps(first.offset(index * octant.line));
+        let two = |a: __m256, b: __m256| _mm512_insertf32x8::<1>(_mm512_castps256_ps512(a), b);
+        let rows = [row(0), row(1), row(2), row(3), row(4)];
+        [[two(rows[0], rows[1]), two(rows[2], rows[3])], [two(rows[1], rows[2]), two(rows[3], rows[4])]]
+    }
+}
+
+impl Avx512 {
+    /// Numbers of two tables of 32: of the first for the lower lanes, of the second for the upper.
+    #[inline(always)]
+    fn pick(self, [near, far]: [[__m512; 2]; 2], index: __m512i) -> __m512 {
+        unsafe {
+            let picked = _mm512_mask2_permutex2var_ps(near[0], index, self.lower, near[1]);
+            _mm512_mask2_permutex2var_ps(far[0], _mm512_castps_si512(picked), self.upper, far[1])
+        }
+    }
 }
 
 /// Height of the ray over bilinear patches at s.
 #[inline(always)]
-fn over([slope, fall, column, behind, height]: [__m256; 5], [rise, across, twist]: [__m256; 3], s: __m256) -> __m256 {
+fn over([slope, fall, column, behind, height]: [__m512; 5], [rise, across, twist]: [__m512; 3], s: __m512) -> __m512 {
     unsafe {
-        let u = _mm256_sub_ps(s, column);
-        let v = _mm256_fmadd_ps(slope, s, behind);
-        let z = _mm256_fmadd_ps(fall, s, height);
-        let z = _mm256_fnmadd_ps(u, rise, z);
-        _mm256_fnmadd_ps(v, _mm256_fmadd_ps(twist, u, across), z)
+        let u = _mm512_sub_ps(s, column);
+        let v = _mm512_fmadd_ps(slope, s, behind);
+        let z = _mm512_fmadd_ps(fall, s, height);
+        let z = _mm512_fnmadd_ps(u, rise, z);
+        _mm512_fnmadd_ps(v, _mm512_fmadd_ps(twist, u, across), z)
     }
 }
 
 #[cold]
 #[inline(never)]
-fn at_the_border<const X: bool>(
-    land: &Single,
-    octant: &Octant,
-    way: &Way,
-    first: &f32,
-    node: &i32,
-    x: usize,
-    y: usize,
-) -> Option<Met> {
-    Portable.patches::<X>(land, octant, way, first, node, x, y)
+fn at_the_border<const X: bool>(land: &Single, octant: &Octant, way: &Way, nodes: [Node; 2]) -> Option<Met> {
+    Portable.patches::<X>(land, octant, way, nodes)
 }
 
 impl Looks for Avx512 {
@@ -137,100 +159,93 @@ impl Looks for Avx512 {
     }
 
     #[inline(always)]
-    fn patches<const X: bool>(
-        self,
-        land: &Single,
-        octant: &Octant,
-        way: &Way,
-        first: &f32,
-        node: &i32,
-        x: usize,
-        y: usize,
-    ) -> Option<Met> {
+    fn patches<const X: bool>(self, land: &Single, octant: &Octant, way: &Way, nodes: [Node; 2]) -> Option<Met> {
+        let [this, other] = nodes;
         // At the map's north and east the samples of fewer patches must do.
-        if x >= land.whole[0] || y >= land.whole[1] {
-            return at_the_border::<X>(land, octant, &{ *way }, first, node, x, y);
+        if this.x.max(other.x) >= land.whole[0] || this.y.max(other.y) >= land.whole[1] {
+            return at_the_border::<X>(land, octant, &{ *way }, nodes);
         }
-        let corner = 4 * (y * land.columns + x);
+        let corners = nodes.map(|node| 4 * (node.y * land.columns + node.x));
         let way = anew(way);
         let (land, octant) = (anew(land), anew(octant));
         let (row_at, slope) = way.row::<X>();
         unsafe {
             let tables = anew(octant.tables);
-            let columns = _mm256_load_ps(tables.columns.0.as_ptr());
-            let odd = _mm256_load_ps(tables.rows.0.as_ptr());
-            let (zero, one) = (_mm256_setzero_ps(), _mm256_set1_ps(tables.one));
-            let column = _mm256_add_ps(columns, _mm256_set1_ps(*anew(first)));
-            let enter = _mm256_max_ps(column, _mm256_set1_ps(way.start));
-            let leave = _mm256_min_ps(_mm256_add_ps(column, one), _mm256_set1_ps(way.end));
-            let base = _mm256_set1_ps(row_at);
-            let inverse = _mm256_set1_ps(way.inverse_slope::<X>());
-            let slope = _mm256_set1_ps(slope);
-            let row = _mm256_add_ps(_mm256_floor_ps(_mm256_fmadd_ps(slope, enter, base)), odd);
-            let place =
-                _mm256_sub_epi32(_mm256_cvttps_epi32(row), _mm256_slli_epi32::<2>(_mm256_set1_epi32(*anew(node))));
+            let columns = _mm512_load_ps(tables.columns.0.as_ptr());
+            let odd = _mm512_load_ps(tables.rows.0.as_ptr());
+            let (zero, one) = (_mm512_setzero_ps(), _mm512_set1_ps(tables.one));
+            let first = _mm512_set1_ps(*anew(this.first));
+            let first = _mm512_mask_blend_ps(self.upper, first, _mm512_set1_ps(*anew(other.first)));
+            let rows = _mm512_set1_epi32(*anew(this.row));
+            let rows = _mm512_mask_blend_epi32(self.upper, rows, _mm512_set1_epi32(*anew(other.row)));
+            let column = _mm512_add_ps(columns, first);
+            let enter = _mm512_max_ps(column, _mm512_set1_ps(way.start));
+            let leave = _mm512_min_ps(_mm512_add_ps(column, one), _mm512_set1_ps(way.end));
+            let base = _mm512_set1_ps(row_at);
+            let inverse = _mm512_set1_ps(way.inverse_slope::<X>());
+            let slope = _mm512_set1_ps(slope);
+            let row = _mm512_roundscale_ps::<DOWN>(_mm512_fmadd_ps(slope, enter, base));
+            let row = _mm512_add_ps(row, odd);
+            let place = _mm512_sub_epi32(_mm512_cvttps_epi32(row), _mm512_slli_epi32::<2>(rows));
             // The line beyond the row is crossed at the piece's end; with the next it begins.
-            let behind = _mm256_sub_ps(base, row);
-            let b = _mm256_min_ps(_mm256_fnmadd_ps(behind, inverse, inverse), leave);
-            let a = _mm256_mask_moveldup_ps(enter, self.odd as u8, b);
-            let valid = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
-            let valid = _mm256_mask_cmplt_epu32_mask(valid, place, _mm256_set1_epi32(tables.four));
+            let behind = _mm512_sub_ps(base, row);
+            let b = _mm512_min_ps(_mm512_fnmadd_ps(behind, inverse, inverse), leave);
+            let a = _mm512_mask_moveldup_ps(enter, self.odd, b);
+            let valid = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b);
+            let valid = _mm512_mask_cmplt_epu32_mask(valid, place, _mm512_set1_epi32(tables.four));
 
             // SAFETY: five rows of eight samples, of which five are looked at; nodes that are whole have as many, and where rows
             // are mirrored they are the same ones from the other end.
-            let first = land.heights.as_ptr().add(corner).offset(octant.start);
-            let two = |index: isize| {
-                let (a, b) = (first.offset(index * octant.line), first.offset((index + 1) * octant.line));
-                _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm256_loadu_ps(a)), _mm256_loadu_ps(b))
-            };
-            let (near, far) = ((two(0), two(2)), (two(1), two(3)));
+            let near = fetch(land, octant, corners[0]);
+            let far = fetch(land, octant, corners[1]);
             let tables = &tables.samples;
             let place = if X {
-                _mm256_slli_epi32::<3>(place)
+                _mm512_slli_epi32::<3>(place)
             } else {
-                _mm256_xor_si256(place, _mm256_set1_epi32(octant.mirror[1] & 3))
+                _mm512_xor_si512(place, _mm512_set1_epi32(octant.mirror[1] & 3))
             };
-            let this = _mm256_add_epi32(place, _mm256_load_si256(tables[0].0.as_ptr().cast()));
-            let that = _mm256_add_epi32(place, _mm256_load_si256(tables[1].0.as_ptr().cast()));
-            let (corner, beside, beyond, last) = (pick(near, this), pick(near, that), pick(far, this), pick(far, that));
+            let this = _mm512_add_epi32(place, _mm512_load_si512(tables[0].0.as_ptr().cast()));
+            let that = _mm512_add_epi32(place, _mm512_load_si512(tables[1].0.as_ptr().cast()));
+            let (corner, beside) = (self.pick([near[0], far[0]], this), self.pick([near[0], far[0]], that));
+            let (beyond, last) = (self.pick([near[1], far[1]], this), self.pick([near[1], far[1]], that));
             let (next, aside) = if X { (beside, beyond) } else { (beyond, beside) };
-            let (rise, across) = (_mm256_sub_ps(next, corner), _mm256_sub_ps(aside, corner));
-            let twist = _mm256_sub_ps(_mm256_sub_ps(last, aside), rise);
+            let (rise, across) = (_mm512_sub_ps(next, corner), _mm512_sub_ps(aside, corner));
+            let twist = _mm512_sub_ps(_mm512_sub_ps(last, aside), rise);
 
-            let height = _mm256_sub_ps(_mm256_set1_ps(way.at.z), corner);
-            let fall = _mm256_set1_ps(way.rate.z);
+            let height = _mm512_sub_ps(_mm512_set1_ps(way.at.z), corner);
+            let fall = _mm512_set1_ps(way.rate.z);
             let lines = [slope, fall, column, behind, height];
             let (f0, f1) = (over(lines, [rise, across, twist], a), over(lines, [rise, across, twist], b));
-            let length = _mm256_sub_ps(b, a);
-            let bend = _mm256_mul_ps(_mm256_mul_ps(twist, slope), _mm256_mul_ps(length, length));
-            let bend = _mm256_sub_ps(zero, bend);
-            let near = _mm256_max_ps(zero, bend);
-            let near = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, _mm256_min_ps(f0, f1), near);
+            let length = _mm512_sub_ps(b, a);
+            let bend = _mm512_mul_ps(_mm512_mul_ps(twist, slope), _mm512_mul_ps(length, length));
+            let bend = _mm512_sub_ps(zero, bend);
+            let near = _mm512_max_ps(zero, bend);
+            let near = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(valid, _mm512_min_ps(f0, f1), near);
             if near == 0 {
                 return None;
             }
-            let slope = _mm256_sub_ps(_mm256_sub_ps(f1, f0), bend);
-            let disc = _mm256_mul_ps(_mm256_mul_ps(_mm256_set1_ps(4.0), bend), f0);
-            let disc = _mm256_fmsub_ps(slope, slope, disc);
-            let falls = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(slope, zero);
-            let dips = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(falls, zero, disc);
-            let turns = _mm256_add_ps(slope, _mm256_add_ps(bend, bend));
-            let dips = _mm256_mask_cmp_ps_mask::<_CMP_LT_OQ>(dips, zero, turns);
-            let under = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(_mm256_min_ps(f0, f1), zero);
+            let slope = _mm512_sub_ps(_mm512_sub_ps(f1, f0), bend);
+            let disc = _mm512_mul_ps(_mm512_mul_ps(_mm512_set1_ps(4.0), bend), f0);
+            let disc = _mm512_fmsub_ps(slope, slope, disc);
+            let falls = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(slope, zero);
+            let dips = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(falls, zero, disc);
+            let turns = _mm512_add_ps(slope, _mm512_add_ps(bend, bend));
+            let dips = _mm512_mask_cmp_ps_mask::<_CMP_LT_OQ>(dips, zero, turns);
+            let under = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(_mm512_min_ps(f0, f1), zero);
             let hit = near & (under | dips);
             if hit == 0 {
                 return None;
             }
-            let root = _mm256_sqrt_ps(_mm256_max_ps(disc, zero));
-            let above = _mm256_mask_blend_ps(falls, _mm256_add_ps(slope, root), _mm256_add_ps(f0, f0));
-            let under = _mm256_mul_ps(_mm256_set1_ps(-2.0), bend);
-            let under = _mm256_mask_blend_ps(falls, under, _mm256_sub_ps(root, slope));
-            let root = _mm256_min_ps(_mm256_div_ps(above, under), one);
-            let root = _mm256_maskz_mov_ps(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(zero, f0), root);
-            let s = _mm256_fmadd_ps(root, length, a);
-            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(f0, zero);
+            let root = _mm512_sqrt_ps(_mm512_max_ps(disc, zero));
+            let above = _mm512_mask_blend_ps(falls, _mm512_add_ps(slope, root), _mm512_add_ps(f0, f0));
+            let under = _mm512_mul_ps(_mm512_set1_ps(-2.0), bend);
+            let under = _mm512_mask_blend_ps(falls, under, _mm512_sub_ps(root, slope));
+            let root = _mm512_min_ps(_mm512_div_ps(above, under), one);
+            let root = _mm512_maskz_mov_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(zero, f0), root);
+            let s = _mm512_fmadd_ps(root, length, a);
+            let below = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(f0, zero);
             let first = hit & hit.wrapping_neg();
-            let s = _mm256_cvtss_f32(_mm256_maskz_compress_ps(first, s));
+            let s = _mm512_cvtss_f32(_mm512_maskz_compress_ps(first, s));
             Some(Met { s, below: below & first != 0 })
         }
     }
