@@ -6,7 +6,7 @@
 //! told: their parents' say what they cannot exceed, and most are never asked for.
 
 use super::super::ScreenMetric;
-use super::stage::{Judged, Lens, Rows, Stage, judge, see};
+use super::stage::{Judged, Lens, Rows, Stage, judge, look_near, see};
 use crate::field::{HeightField, HeightRange};
 use crate::space::Cell;
 use std::ops::Range;
@@ -217,7 +217,9 @@ impl Page {
         } else {
             see(&lens, &stage, rows);
         }
-        let mut judged = if wanted == Wanted::Sight {
+        let mut judged = if stage.near {
+            look_near(asked, &lens, self.at(level, 0, 0), wanted != Wanted::Sight, rows)
+        } else if wanted == Wanted::Sight {
             rows.above.fill(0);
             Judged::default()
         } else {
@@ -289,20 +291,27 @@ mod tests {
     #[test]
     fn pages_are_measured_as_single_cells_are() {
         let heights = (0..129 * 129).map(|i| ((i * 7919) % 101) as f32 * 0.1).collect();
-        let land = Land::new(Raster::new(129, 129, DVec2::new(3.0, 5.0), heights).expect("valid"));
-        let middle = land.origin() + 0.5 * land.extent();
+        let bumps = Land::new(Raster::new(129, 129, DVec2::new(3.0, 5.0), heights).expect("valid"));
+        // The eye is lower than many of the hills about it.
+        let hill = |i: usize| 400.0 + 150.0 * ((i % 129) as f32 * 0.105).sin() * ((i / 129) as f32 * 0.085).cos();
+        let hills = Raster::new(129, 129, DVec2::splat(15.0), (0..129 * 129).map(hill).collect()).expect("valid");
+        let hills = Land::new(hills);
         let (mut cut, mut left) = (0, 0);
-        for (eye, tolerance) in [
-            ((-40.0, 60.0, 130.0), 30.0),
-            ((-900.0, 90.0, 20.0), 4.0),
-            ((-250.0, 60.0, 20.0), 60.0),
-            ((0.0, 0.0, 60.0), 90.0),
-            ((0.0, 0.0, 400.0), 0.5),
+        for (land, eye, tolerance) in [
+            (&bumps, (-40.0, 60.0, 130.0), 30.0),
+            (&bumps, (-900.0, 90.0, 20.0), 4.0),
+            (&bumps, (-250.0, 60.0, 20.0), 60.0),
+            (&bumps, (0.0, 0.0, 60.0), 90.0),
+            (&bumps, (0.0, 0.0, 400.0), 0.5),
+            (&hills, (500.0, 744.0, 480.0), 2.0),
+            (&hills, (1200.0, 300.0, 500.0), 0.5),
         ] {
-            let view = View::looking_at(DVec3::from(eye), middle.extend(2.0), 0.8, UVec2::new(320, 200));
+            let middle = land.origin() + 0.5 * land.extent();
+            let eye = DVec3::from(eye);
+            let view = View::looking_at(eye, middle.extend(2.0), 0.8, UVec2::new(320, 200));
             let metric = ScreenMetric::new(&view, land.datum()).expect("a view");
             for (cell, depth, finest) in [(Cell::face(0), 6, 7), (Cell { level: 1, x: 1, y: 0, face: 0 }, 6, 7)] {
-                let asked = Asked { field: &land, metric: &metric, tolerance, finest };
+                let asked = Asked { field: land, metric: &metric, tolerance, finest };
                 let mut page = Page::of(cell, depth);
                 let worst = page.refine(&asked);
                 let told = if page.doubt > worst { page.resolve(&asked).max(worst) } else { worst };
@@ -311,7 +320,7 @@ mod tests {
                     for x in (0..1u32 << level).filter(|x| page.quarters(level, y) >> x & 1 == 1) {
                         let cell = page.at(level, x, y);
                         let error = land.error(cell);
-                        let Some((_, pixels)) = metric.cell(&land, cell, error) else { continue };
+                        let Some((_, pixels)) = metric.cell(land, cell, error) else { continue };
                         let is = |bits: &[u64; ROWS]| bits[row(level, y)] >> x & 1 == 1;
                         assert!(is(&page.drawn), "{cell:?} is seen");
                         if cell.level < finest && SEAMS * pixels > tolerance * (1.0 + 1e-4) {
@@ -323,7 +332,7 @@ mod tests {
                             Cell { level: cell.level + 1, x: at(cell.x, i), y: at(cell.y, j), ..cell }
                         });
                         for fine in beside.into_iter().filter(|c| c.x >> c.level == 0 && c.y >> c.level == 0) {
-                            let off = metric.cell(&land, fine, error).map_or(0.0, |(_, pixels)| SEAMS * pixels);
+                            let off = metric.cell(land, fine, error).map_or(0.0, |(_, pixels)| SEAMS * pixels);
                             let may = is(&page.cut) || cell.level == finest || off <= tolerance * (1.0 + 1e-4);
                             assert!(may, "{cell:?} is {off} pixels off at a finer neighbour");
                         }

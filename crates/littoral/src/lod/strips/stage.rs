@@ -3,10 +3,11 @@
 //! How near and how visible a cell is is a matter of its place and of the slab of heights about it. Columns are worked out once for a level, slabs once for its
 //! rows within a block, and what is left for each row are a root and a quotient for sixteen cells at once.
 
+use super::super::metric::Bounds;
 use super::page::{Asked, SEAMS, SIDE};
 use crate::field::HeightRange;
 use crate::space::{Cell, Datum, View};
-use glam::DVec2;
+use glam::{DVec2, Vec3};
 use multiversion::multiversion;
 
 /// Bounds of seen and whole cells (pixels).
@@ -52,6 +53,8 @@ pub(super) struct Stage {
     pub whole: bool,
     /// Whether all of it lies within the frame.
     pub inside: bool,
+    /// Whether the eye is nearer than its heights differ: then each cell is judged by its own heights, not by those of blocks.
+    pub near: bool,
     /// What rounding may take from lengths (m).
     slack: f32,
 }
@@ -101,7 +104,10 @@ impl Stage {
         };
         let inside = lens.sides.iter().all(|&side| least(side) >= slack) && least(lens.forward) >= View::NEAR + slack;
         let whole = asked.field.error(page).is_finite() && !asked.field.range(page).is_empty();
-        Stage { slabs, slab, whole, inside, slack }
+        let apart = |[low, high]: [f32; 2]| low.max(-high).max(0.0);
+        let away = apart(columns).hypot(apart(rows)).hypot(apart([slab.low, slab.high]));
+        let near = away < slab.high - slab.low;
+        Stage { slabs, slab, whole, inside, near, slack }
     }
 }
 
@@ -254,6 +260,60 @@ pub(super) fn judge(lens: &Lens, stage: &Stage, rows: &mut Rows) -> Judged {
         }
     }
     Judged { worst: worst.into_iter().fold(0.0, f32::max), most: most_above.into_iter().fold(0.0, f32::max) }
+}
+
+/// Says which cells near the eye may lie within the frame, of those of which `seen` says so, and, if asked to, judges them, each by its own heights and those of
+/// the cells beside it; `first` is the level's first cell.
+pub(super) fn look_near(asked: &Asked, lens: &Lens, first: Cell, judges: bool, rows: &mut Rows) -> Judged {
+    let mut judged = Judged::default();
+    let (seams, apart) = if lens.cuts { (SEAMS, 0.0) } else { (1.0, lens.tolerance / SEAMS) };
+    let cells = 1i64 << first.level;
+    let beyond = Vec3::new(lens.beyond[0], lens.beyond[1], 0.0);
+    for y in 0..1usize << lens.level {
+        rows.above[y] = 0;
+        let mut left = rows.cells[y] & rows.seen[y];
+        if left == 0 {
+            continue;
+        }
+        let start = left.trailing_zeros();
+        let (west, count) = (i64::from(first.x + start) - 1, i64::from(64 - left.leading_zeros() - start) + 2);
+        let (from, to) = (west.max(0), (west + count).min(cells));
+        let part = (from - west) as usize..(to - west) as usize;
+        let (mut ranges, mut errors) = ([[HeightRange::EMPTY; SIDE + 2]; 3], [0.0; SIDE + 2]);
+        for (k, ranges) in ranges.iter_mut().enumerate() {
+            let row = i64::from(first.y) + y as i64 + k as i64 - 1;
+            if (lens.cuts || k == 1) && (0..cells).contains(&row) {
+                let first = Cell { x: from as u32, y: row as u32, ..first };
+                asked.field.row(first, &mut ranges[part.clone()], &mut errors[part.clone()]);
+            }
+        }
+        while left != 0 {
+            let x = left.trailing_zeros();
+            left &= left - 1;
+            let at = (x - start) as usize;
+            let beside = ranges.iter().flat_map(|row| &row[at..at + 3]);
+            let all = beside.fold(HeightRange::EMPTY, |all, range| all.union(*range));
+            let range = if lens.cuts { all } else { ranges[1][at + 1] };
+            let cell = Cell { x: first.x + x, y: first.y + y as u32, ..first };
+            let own = asked.metric.bounds(cell, range);
+            let bounds = Bounds { low: own.low - beyond, high: own.high + beyond };
+            if !asked.metric.sees(&bounds) {
+                rows.seen[y] &= !(1 << x);
+                continue;
+            }
+            if !judges || rows.whole[y] >> x & 1 == 0 {
+                continue;
+            }
+            let bound = seams * asked.metric.pixels(&bounds, rows.errors[y][x as usize]) * (1.0 + 1e-5) + apart;
+            if lens.cuts && bound > lens.tolerance {
+                rows.above[y] |= 1 << x;
+                judged.most = judged.most.max(bound);
+            } else {
+                judged.worst = judged.worst.max(bound);
+            }
+        }
+    }
+    judged
 }
 
 /// Says which of the cells may lie within the frame.
