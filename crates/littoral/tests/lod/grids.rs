@@ -3,6 +3,7 @@
 use super::{METHODS, Random, random_land};
 use glam::{DVec2, DVec3, UVec2};
 use littoral::field::noise::{Fbm, NoiseField};
+use littoral::field::{Land, Raster};
 use littoral::lod::{Drawing, Limits, Lod, Nested, Strips};
 use littoral::space::View;
 
@@ -99,5 +100,24 @@ fn strips_are_the_same_on_any_number_of_threads() {
     assert!(alone.0.len() > 64 * 64 * 130, "{} vertices", alone.0.len());
     for threads in [2, 5] {
         assert!(drawn(threads) == alone, "on {threads} threads");
+    }
+}
+
+/// Heights of blocks of cells reach up to an eye that stands low among hills; the cells' own do not.
+#[test]
+fn strips_keep_their_tolerance_about_a_low_eye() {
+    let height = |i: usize| {
+        let (x, y) = ((i % 65) as f32 * 0.21, (i / 65) as f32 * 0.17);
+        400.0 + 150.0 * x.sin() * y.cos() + 20.0 * (3.0 * x + y).sin()
+    };
+    let raster = Raster::new(65, 65, DVec2::splat(30.0), (0..65 * 65).map(height).collect()).expect("valid");
+    let land = Land::at(raster, DVec2::ZERO);
+    let (eye, look) = (DVec3::new(514.2, 744.6, 484.97), DVec3::new(965.2, 1005.0, 430.2));
+    let mut view = View::looking_at(eye, look, 0.62, UVec2::new(96, 54));
+    let mut lod = Strips::new(Limits { finest: 6, ..Limits::default() });
+    for tolerance in [2.0, 8.0] {
+        view.tolerance_pixels = tolerance;
+        let reached = lod.select(&land, &view, &mut Drawing::default()).expect("a view");
+        assert!(!reached.limited && reached.pixels <= tolerance, "{tolerance} pixels asked: {reached:?}");
     }
 }
