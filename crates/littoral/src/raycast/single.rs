@@ -1,10 +1,11 @@
-//! One ray at a time: its way through 64 nodes, or through 16 patches, decided by one comparison.
+//! One ray at a time: its way through 64 nodes, or through the 16 patches of each of two, decided by one comparison.
 //!
 //! Along its major axis a ray crosses a column of nodes in at most two rows: the one it enters and the one it leaves by. So
 //! eight columns of a block are sixteen nodes in the order of the way, and the first of them that reaches up to the ray is
-//! where to look closer: in the 8 × 8 nodes below it or, at the end, in its 4 × 4 patches, eight pieces of the way at once.
-//! Blocks left without a hit are taken up again where they were left. The walk begins at a block of the middle level and
-//! climbs only when it must: looking for a better one costs more than it saves.
+//! where to look closer: in the 8 × 8 nodes below it or, at the end, in its 4 × 4 patches and in those of the next such node,
+//! eight pieces of the way each. Blocks left without a hit are taken up again where they were left. The walk begins at a block
+//! of the middle level and climbs only when it must: looking for a better one costs more than it saves, and a ray that falls
+//! through half of the ground's heights within a block goes on to the next.
 //!
 //! The way is told by the position s along the major axis, in which lines between cells are integers. Lattice axes are
 //! mirrored so that both directions are positive, and everything counts from a corner of nodes near the anchor.
@@ -156,7 +157,6 @@ struct Tables {
     one: f32,
     four: i32,
     eight: i32,
-    word: i32,
 }
 
 /// Rows of the nodes of a block along the way, column after column: entered, left.
@@ -175,7 +175,6 @@ static TABLES: [Tables; 8] = {
             one: 1.0,
             four: 4,
             eight: 8,
-            word: 0xFFFF,
         }
     }; 8];
     let mut table = 0;
