@@ -441,7 +441,6 @@ fn what_is_shorter_than_a_footprint_is_known_by_octaves() {
         assert!(told >= 0.999 * highest, "{told} below {length} m, not {highest}");
         octaves.push(highest);
     }
-    println!("{octaves:?}");
     assert!(octaves.iter().filter(|highest| **highest > 0.0).count() > 2);
 }
 

@@ -424,6 +424,10 @@ impl HeightField for Sea {
 
     fn row(&self, first: Cell, ranges: &mut [HeightRange], errors: &mut [f32]) {
         ranges.fill(self.range(first));
+        self.errors(first, errors);
+    }
+
+    fn errors(&self, first: Cell, errors: &mut [f32]) {
         errors.fill(self.error(first));
     }
 

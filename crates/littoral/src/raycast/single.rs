@@ -509,7 +509,7 @@ impl<'a> Single<'a> {
                     return f32::INFINITY;
                 }
                 // A ray that falls or rises so fast is soon through: it needs no larger blocks.
-                if !(*floor).last && 8.0 * (*floor).side * way.rate.z.abs() < octant.relief {
+                if !(*floor).last && 8.0 * (*floor).side * way.rate.z.abs() <= octant.relief {
                     (frame, floor) = (frame.add(1), floor.add(1));
                     highest = frame;
                     node = node.map(|node| node >> 3);

@@ -271,9 +271,9 @@ impl<G: Ground> RoamFlight<'_, G> {
             if let Some(urgent) = self.urgent {
                 (low, high) = (urgent.0.max(low), urgent.1.min(high));
             }
-            let (splits, merges) = (Between::new(low, f32::INFINITY), Between::new(-1.0, high));
+            let within = [Between::new(low, f32::INFINITY), Between::new(-1.0, high)];
             let found = [&mut self.found, &mut self.found_merges];
-            self.list.measure(&self.bounds, lens, part, splits, merges, found);
+            self.list.measure(&self.bounds, lens, part, within, found);
             if self.urgent.is_some() && self.found_merges.len() > URGENT {
                 // Of what is out of sight one is as good as the other.
                 self.found_merges.truncate(URGENT);

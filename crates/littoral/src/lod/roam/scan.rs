@@ -245,13 +245,12 @@ impl List {
         ground: &impl Ground,
         lens: &Lens,
         part: std::ops::Range<usize>,
-        splits: Between,
-        merges: Between,
+        within: [Between; 2],
         found: [&mut Vec<u32>; 2],
     ) {
-        let [found_splits, found_merges] = found;
-        found_splits.clear();
-        found_merges.clear();
+        let [splits, merges] = found;
+        splits.clear();
+        merges.clear();
         // A few at a time: they are looked at while they are near.
         for first in (0..self.items.len()).step_by(1024) {
             let end = (first + 1024).min(self.items.len());
@@ -260,18 +259,18 @@ impl List {
                 let slopes = self.slopes.get(due.clone()).unwrap_or_default();
                 ground.measure(lens, &self.items[due.clone()], slopes, &mut self.numbers[due]);
             }
-            find(&self.numbers[first..end], first as u32, splits, merges, found_splits, found_merges);
+            find(&self.numbers[first..end], first as u32, within, [&mut *splits, &mut *merges]);
         }
-        found_splits.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
+        splits.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
     }
 
     /// The same, as they were measured last.
-    pub(super) fn find(&self, splits: Between, merges: Between, found: [&mut Vec<u32>; 2]) {
-        let [found_splits, found_merges] = found;
-        found_splits.clear();
-        found_merges.clear();
-        find(&self.numbers, 0, splits, merges, found_splits, found_merges);
-        found_splits.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
+    pub(super) fn find(&self, within: [Between; 2], found: [&mut Vec<u32>; 2]) {
+        let [splits, merges] = found;
+        splits.clear();
+        merges.clear();
+        find(&self.numbers, 0, within, [&mut *splits, &mut *merges]);
+        splits.retain(|&place| self.items[place as usize].word & 3 == u32::from(SPLIT));
     }
 
     /// Greatest priority of what is not split.
@@ -493,39 +492,26 @@ impl Between {
     }
 }
 
-/// Puts where numbers are whose priority is among those asked for, of those without and of those with the sign bit, into `splits` and `merges`; the first is
-/// at `first`.
-fn find(
-    numbers: &[f32],
-    first: u32,
-    positive: Between,
-    negative: Between,
-    splits: &mut Vec<u32>,
-    merges: &mut Vec<u32>,
-) {
-    let negative = Between { low: negative.low ^ 1 << 31, ..negative };
+/// Tells where numbers are whose priority is among those asked for: of those without the sign bit, and of those with it. The first is at `first`.
+fn find(numbers: &[f32], first: u32, within: [Between; 2], found: [&mut Vec<u32>; 2]) {
+    let [positive, negative] = within;
+    let within = [positive, Between { low: negative.low ^ 1 << 31, ..negative }];
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx512f") {
         // SAFETY: the processor has what the function was compiled for.
-        return unsafe { find_wide(numbers, first, positive, negative, splits, merges) };
+        return unsafe { find_wide(numbers, first, within, found) };
     }
-    find_portable(numbers, first, positive, negative, splits, merges);
+    find_portable(numbers, first, within, found);
 }
 
 /// Compilers make of such masks five times as many instructions.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn find_wide(
-    numbers: &[f32],
-    first: u32,
-    positive: Between,
-    negative: Between,
-    splits: &mut Vec<u32>,
-    merges: &mut Vec<u32>,
-) {
+fn find_wide(numbers: &[f32], first: u32, within: [Between; 2], found: [&mut Vec<u32>; 2]) {
     use std::arch::x86_64::{_mm512_cmple_epu32_mask, _mm512_loadu_epi32, _mm512_set1_epi32, _mm512_sub_epi32};
-    let [low, span, other, other_span] =
-        [positive.low, positive.span, negative.low, negative.span].map(|bits| _mm512_set1_epi32(bits.cast_signed()));
+    let number = |bits: u32| _mm512_set1_epi32(bits.cast_signed());
+    let [[low, span], [other, other_span]] = within.map(|within| [number(within.low), number(within.span)]);
+    let [splits, merges] = found;
     let chunks = numbers.chunks_exact(LANES);
     let (rest, mut first) = (chunks.remainder(), first);
     for numbers in chunks {
@@ -543,24 +529,16 @@ fn find_wide(
         }
         first += LANES as u32;
     }
-    find_portable(rest, first, positive, negative, splits, merges);
+    find_portable(rest, first, within, [splits, merges]);
 }
 
-fn find_portable(
-    numbers: &[f32],
-    first: u32,
-    positive: Between,
-    negative: Between,
-    splits: &mut Vec<u32>,
-    merges: &mut Vec<u32>,
-) {
+fn find_portable(numbers: &[f32], first: u32, within: [Between; 2], mut found: [&mut Vec<u32>; 2]) {
     for (number, place) in numbers.iter().zip(first..) {
         let bits = number.to_bits();
-        if bits.wrapping_sub(positive.low) <= positive.span {
-            splits.push(place);
-        }
-        if bits.wrapping_sub(negative.low) <= negative.span {
-            merges.push(place);
+        for (within, found) in within.iter().zip(&mut found) {
+            if bits.wrapping_sub(within.low) <= within.span {
+                found.push(place);
+            }
         }
     }
 }
@@ -583,14 +561,14 @@ mod tests {
                 let between = Between::new(above, most);
                 for (one, other) in [(between, Between::NONE), (Between::NONE, between), (between, between)] {
                     let (mut splits, mut merges) = (Vec::new(), Vec::new());
-                    find(&numbers, 5, one, other, &mut splits, &mut merges);
+                    find(&numbers, 5, [one, other], [&mut splits, &mut merges]);
                     let wanted = |part: Between, negative| {
                         if part.span == 0 && part.low == Between::NONE.low { Vec::new() } else { expected(negative) }
                     };
                     assert_eq!((&splits, &merges), (&wanted(one, false), &wanted(other, true)), "{above} {most}");
                     let (mut portable, mut portable_merges) = (Vec::new(), Vec::new());
                     let flipped = Between { low: other.low ^ 1 << 31, ..other };
-                    find_portable(&numbers, 5, one, flipped, &mut portable, &mut portable_merges);
+                    find_portable(&numbers, 5, [one, flipped], [&mut portable, &mut portable_merges]);
                     assert_eq!((splits, merges), (portable, portable_merges), "{above} {most}");
                 }
             }

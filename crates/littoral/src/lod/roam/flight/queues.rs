@@ -146,8 +146,8 @@ impl<G: Ground> RoamFlight<'_, G> {
     /// Makes the band wider and takes what it holds into the queues.
     fn widen(&mut self, low: f32, high: f32) {
         let (low, high) = (low.min(self.band.0), high.max(self.band.1));
-        let (splits, merges) = (Between::new(low.max(self.tolerance), self.band.0), Between::new(self.band.1, high));
-        self.list.find(splits, merges, [&mut self.found, &mut self.found_merges]);
+        let within = [Between::new(low.max(self.tolerance), self.band.0), Between::new(self.band.1, high)];
+        self.list.find(within, [&mut self.found, &mut self.found_merges]);
         self.enter(low, high);
     }
 
