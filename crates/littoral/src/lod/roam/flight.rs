@@ -22,7 +22,7 @@
 
 use super::CORNERS;
 use super::bounds::{Bound, NestedBounds};
-use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
+use super::diamond::{Diamond, FINEST, Point, STEPS};
 use super::factors::Factors;
 use super::ground::Ground;
 use super::scan::{Between, Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
@@ -118,8 +118,8 @@ pub struct RoamFlight<'a, G = &'a NestedBounds> {
     lens: Option<Lens>,
     triangles: usize,
     mesh: Mesh,
-    /// Record and side of each triangle.
-    owners: Vec<u32>,
+    /// The record of each vertex but the corners: that of the diamond it is the middle of.
+    makers: Vec<u32>,
     unused_vertices: Vec<u32>,
     freed: Vec<u32>,
     changed: Changes,
@@ -179,7 +179,7 @@ impl<G: Ground> RoamFlight<'_, G> {
             lens: None,
             triangles: 0,
             mesh: Mesh::default(),
-            owners: Vec::new(),
+            makers: Vec::new(),
             unused_vertices: Vec::new(),
             freed: Vec::new(),
             changed: Changes::default(),
@@ -293,10 +293,11 @@ impl<G: Ground> RoamFlight<'_, G> {
         self.unused.clear();
         self.list.clear();
         self.mesh.clear();
-        self.owners.clear();
+        self.makers.clear();
         self.unused_vertices.clear();
         self.freed.clear();
         self.mesh.vertices.extend(CORNERS.map(|at| self.vertex(at)));
+        self.makers.extend([NONE; 4]);
         (0..4).for_each(|corner| Changes::mark(&mut self.changed.vertices, corner));
         let root = self.record(Diamond::ROOT, [0, 2]);
         self.triangles = 2;
@@ -397,33 +398,21 @@ impl<G: Ground> RoamFlight<'_, G> {
         known.parents.map(|parent| if parent == NONE { NONE } else { self.records[parent as usize].triangles[0] })
     }
 
-    /// Through a parent to a child's other parent, and how the child lies to that.
-    #[inline]
-    fn beyond(&self, known: &Record, diamond: Diamond, child: usize) -> (u32, usize) {
-        let (parent, other, back) = if diamond.is_square() {
-            let (slot, own) = match (diamond.base, child) {
-                (Base::Rising, 0 | 1) => (0, 3),
-                (Base::Rising, _) => (1, 1),
-                (_, 1 | 2) => (0, 0),
-                _ => (1, 2),
-            };
-            (known.parents[slot], if child & 1 == 1 { own ^ 1 } else { 3 - own }, child ^ 2)
-        } else {
-            let (first, other) = match diamond.base {
-                Base::East => (child >= 2, [3, 1, 1, 3][child]),
-                _ => (child == 0 || child == 3, [0, 0, 2, 2][child]),
-            };
-            let slot = usize::from(known.parents[1] != NONE && !first);
-            (known.parents[slot], other, [2, 3, 0, 1][child])
-        };
-        (self.records.get(parent as usize).map_or(NONE, |parent| parent.children[other]), back)
+    /// A child's other parent, if there is a record of it.
+    #[inline(always)]
+    fn beyond(&self, known: &Record, diamond: Diamond, child: usize) -> u32 {
+        let (through, other) = diamond.beyond(child);
+        // At the border there is one parent only, whichever side it is on.
+        let parent = known.parents[through & usize::from(known.parents[1] != NONE)];
+        self.records.get(parent as usize).map_or(NONE, |parent| parent.children[other])
     }
 
     /// The record of a split diamond's child, if the child's other parent has made it.
+    #[inline(always)]
     fn met(&self, known: &Record, diamond: Diamond, child: usize) -> Option<u32> {
-        let (other, back) = self.beyond(known, diamond, child);
+        let other = self.beyond(known, diamond, child);
         let other = self.records.get(other as usize).filter(|other| other.split)?;
-        Some(other.children[back]).filter(|&child| child != NONE)
+        Some(other.children[child ^ 2]).filter(|&child| child != NONE)
     }
 
     /// Splits a diamond that has both triangles.
@@ -437,10 +426,12 @@ impl<G: Ground> RoamFlight<'_, G> {
         let slot = match self.unused_vertices.pop() {
             Some(slot) => {
                 self.mesh.vertices[slot as usize] = vertex;
+                self.makers[slot as usize] = record;
                 slot
             }
             None => {
                 self.mesh.vertices.push(vertex);
+                self.makers.push(record);
                 self.mesh.vertices.len() as u32 - 1
             }
         };
@@ -455,16 +446,18 @@ impl<G: Ground> RoamFlight<'_, G> {
                 }
             }
         }
-        let apexes = self.apexes(&known, diamond);
-        for (i, child) in diamond.children().into_iter().enumerate() {
-            let Some(child) = child else { continue };
-            let ends = child_ends(diamond, known.ends, apexes, i);
+        let [a, b] = known.ends;
+        let [p, q] = self.apexes(&known, diamond);
+        let corners = [a, b, p, if q == NONE { p } else { q }];
+        for i in 0..4 {
+            let Some(child) = diamond.child(i) else { continue };
+            let ends = diamond.child_ends(corners, i);
             let of = match self.met(&known, diamond, i) {
                 Some(of) => of,
                 None => self.record(child, ends),
             };
             let border = at_border(child);
-            let side = if border { 0 } else { side_of_parent(diamond, i) };
+            let side = if border { 0 } else { diamond.side_of(i) };
             self.records[record as usize].children[i] = of;
             let held = &mut self.records[of as usize];
             held.parents[side] = record;
@@ -528,38 +521,6 @@ impl<G: Ground> RoamFlight<'_, G> {
                 }
             }
         }
-    }
-}
-
-/// Which parent of its child a diamond is, but at the border of the face.
-#[inline]
-fn side_of_parent(diamond: Diamond, child: usize) -> usize {
-    usize::from(if diamond.is_square() { child >= 2 } else { child == 1 || child == 2 })
-}
-
-/// The ends of a child's base: one of its parent's ends, and one of its apexes.
-#[inline]
-fn child_ends(diamond: Diamond, ends: [u32; 2], apexes: [u32; 2], child: usize) -> [u32; 2] {
-    let [a, b] = ends;
-    let [p, q] = apexes;
-    match (diamond.base, child) {
-        (Base::Rising, 0) => [a, p],
-        (Base::Rising, 1) => [p, b],
-        (Base::Rising, 2) => [q, b],
-        (Base::Rising, _) => [a, q],
-        (Base::Falling, 0) => [q, b],
-        (Base::Falling, 1) => [b, p],
-        (Base::Falling, 2) => [a, p],
-        (Base::Falling, _) => [q, a],
-        // At the border there is one apex only, whichever side it is on.
-        (Base::East, 0) => [a, if q == NONE { p } else { q }],
-        (Base::East, 1) => [if q == NONE { p } else { q }, b],
-        (Base::East, 2) => [p, b],
-        (Base::East, _) => [a, p],
-        (Base::North, 0) => [p, a],
-        (Base::North, 1) => [a, if q == NONE { p } else { q }],
-        (Base::North, 2) => [b, if q == NONE { p } else { q }],
-        (Base::North, _) => [p, b],
     }
 }
 
