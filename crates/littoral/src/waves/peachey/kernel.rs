@@ -5,10 +5,12 @@
 //! nodes come first, which slopes share with heights. What follows from these sums has points along lanes.
 
 use super::{Node, Peachey, Train};
+use crate::waves::fft::kernel::transpose;
 use crate::waves::sum::{circle, power_of_two};
 use crate::waves::{BLOCK, Motion, Points, Velocity};
 use multiversion::multiversion;
 use std::f32::consts::{LOG2_E, PI, TAU};
+use std::slice::from_ref;
 
 type Lanes = [f32; BLOCK];
 
@@ -42,10 +44,11 @@ struct Weights {
     by_short: [Lanes; 3],
 }
 
-/// Sums over nodes: of phases (cycles) less those of the deep, and of all else. Values first; then, of three jets, derivatives eastward and northward.
-struct Sums<const JETS: usize> {
-    cycles: [[f64; BLOCK]; JETS],
-    others: [[Lanes; 4]; JETS],
+/// Sums over nodes: of phases (cycles) less those of the deep, and of all else. Four of each: values for up to four trains, or for one train values and derivatives
+/// eastward and northward.
+struct Sums {
+    cycles: [[f64; BLOCK]; 4],
+    others: [[Lanes; 4]; 4],
 }
 
 /// Weights of points (m from the first node), and the nodes before them among those with a border.
@@ -105,81 +108,60 @@ fn taps<const JETS: usize>(waves: &Peachey, points: &Points) -> Taps {
 
 /// Sums over the nodes around each point.
 #[inline(always)]
-fn sum<const JETS: usize>(train: &Train, taps: &Taps) -> Sums<JETS> {
-    let mut cycles = [[0.0; BLOCK]; JETS];
-    let mut rows = [[[0f32; 4]; BLOCK]; JETS];
+fn sum<const JETS: usize>(trains: &[Train], taps: &Taps) -> Sums {
+    let mut cycles = [[0.0; BLOCK]; 4];
+    let mut table = [[0f32; BLOCK]; BLOCK];
     for lane in 0..BLOCK {
-        let mut long = [0f64; JETS];
-        let mut short = [[0f32; 4]; JETS];
-        for j in 0..3 {
-            let nodes = &train.nodes[taps.first[lane] as usize + j * taps.stride..][..3];
-            let (mut row, mut row_by) = (0f64, 0f64);
-            let (mut others, mut others_by) = ([0f32; 4], [0f32; 4]);
-            for i in 0..3 {
-                let Node { cycles, amplitude, shore, wavenumber, depth } = nodes[i];
-                let numbers = [amplitude, shore, wavenumber, depth];
-                row = taps.across.of[i][lane].mul_add(cycles, row);
+        for (train, first) in trains.iter().zip((0..4).step_by(JETS)) {
+            let mut long = [0f64; JETS];
+            let mut short = [[0f32; 4]; JETS];
+            for j in 0..3 {
+                let nodes = &train.nodes[taps.first[lane] as usize + j * taps.stride..][..3];
+                let (mut row, mut row_by) = (0f64, 0f64);
+                let (mut others, mut others_by) = ([0f32; 4], [0f32; 4]);
+                for i in 0..3 {
+                    let Node { cycles, amplitude, shore, wavenumber, depth } = nodes[i];
+                    let numbers = [amplitude, shore, wavenumber, depth];
+                    row = taps.across.of[i][lane].mul_add(cycles, row);
+                    for n in 0..4 {
+                        others[n] = taps.across.of_short[i][lane].mul_add(numbers[n], others[n]);
+                    }
+                    if JETS > 1 {
+                        row_by = taps.across.by[i][lane].mul_add(cycles, row_by);
+                        for n in 0..4 {
+                            others_by[n] = taps.across.by_short[i][lane].mul_add(numbers[n], others_by[n]);
+                        }
+                    }
+                }
+                let (up, up_by) = (taps.up.of[j][lane], taps.up.by[j][lane]);
+                let (up_short, up_by_short) = (taps.up.of_short[j][lane], taps.up.by_short[j][lane]);
+                long[0] = up.mul_add(row, long[0]);
                 for n in 0..4 {
-                    others[n] = taps.across.of_short[i][lane].mul_add(numbers[n], others[n]);
+                    short[0][n] = up_short.mul_add(others[n], short[0][n]);
                 }
                 if JETS > 1 {
-                    row_by = taps.across.by[i][lane].mul_add(cycles, row_by);
+                    long[1 % JETS] = up.mul_add(row_by, long[1 % JETS]);
+                    long[2 % JETS] = up_by.mul_add(row, long[2 % JETS]);
                     for n in 0..4 {
-                        others_by[n] = taps.across.by_short[i][lane].mul_add(numbers[n], others_by[n]);
+                        short[1 % JETS][n] = up_short.mul_add(others_by[n], short[1 % JETS][n]);
+                        short[2 % JETS][n] = up_by_short.mul_add(others[n], short[2 % JETS][n]);
                     }
                 }
             }
-            let (up, up_by) = (taps.up.of[j][lane], taps.up.by[j][lane]);
-            let (up_short, up_by_short) = (taps.up.of_short[j][lane], taps.up.by_short[j][lane]);
-            long[0] = up.mul_add(row, long[0]);
-            for n in 0..4 {
-                short[0][n] = up_short.mul_add(others[n], short[0][n]);
-            }
-            if JETS > 1 {
-                long[1 % JETS] = up.mul_add(row_by, long[1 % JETS]);
-                long[2 % JETS] = up_by.mul_add(row, long[2 % JETS]);
+            for jet in 0..JETS {
+                cycles[first + jet][lane] = long[jet];
                 for n in 0..4 {
-                    short[1 % JETS][n] = up_short.mul_add(others_by[n], short[1 % JETS][n]);
-                    short[2 % JETS][n] = up_by_short.mul_add(others[n], short[2 % JETS][n]);
+                    table[lane][4 * (first + jet) + n] = short[jet][n];
                 }
             }
         }
-        for jet in 0..JETS {
-            cycles[jet][lane] = long[jet];
-            rows[jet][lane] = short[jet];
-        }
     }
-    let mut others = [[[0f32; BLOCK]; 4]; JETS];
-    for jet in 0..JETS {
-        others[jet] = turned(&rows[jet]);
+    transpose(&mut table);
+    let mut others = [[[0f32; BLOCK]; 4]; 4];
+    for n in 0..BLOCK {
+        others[n / 4][n % 4] = table[n];
     }
     Sums { cycles, others }
-}
-
-/// Numbers of each point as each number of all points.
-#[inline(always)]
-fn turned(rows: &[[f32; 4]; BLOCK]) -> [Lanes; 4] {
-    let mut quarters = [[0f32; BLOCK]; 4];
-    for i in 0..BLOCK {
-        for q in 0..4 {
-            quarters[q][i] = rows[4 * q + i / 4][i % 4];
-        }
-    }
-    let [a, b, c, d] = quarters;
-    let ((a, b), (c, d)) = (dealt(&a, &b), dealt(&c, &d));
-    let ((a, c), (b, d)) = (dealt(&a, &c), dealt(&b, &d));
-    [a, b, c, d]
-}
-
-/// Numbers of even and odd places.
-#[inline(always)]
-fn dealt(first: &Lanes, second: &Lanes) -> (Lanes, Lanes) {
-    let (mut even, mut odd) = ([0f32; BLOCK], [0f32; BLOCK]);
-    for i in 0..BLOCK / 2 {
-        (even[i], odd[i]) = (first[2 * i], first[2 * i + 1]);
-        (even[BLOCK / 2 + i], odd[BLOCK / 2 + i]) = (second[2 * i], second[2 * i + 1]);
-    }
-    (even, odd)
 }
 
 /// Phases (cycles within ±½).
@@ -227,18 +209,20 @@ pub(super) fn add_displacement(waves: &Peachey, points: &Points, motion: &mut Mo
 pub(super) fn add_displacement_body(waves: &Peachey, points: &Points, motion: &mut Motion) {
     let taps = taps::<1>(waves, points);
     let mut up = [0f32; BLOCK];
-    for train in &waves.trains {
-        let sums = sum::<1>(train, &taps);
-        let phases = phases(train, &taps, &sums.cycles[0]);
-        let [mut amplitude, shore, wavenumber, _] = sums.others[0];
-        if taps.wide {
-            for lane in 0..BLOCK {
-                amplitude[lane] *= left(wavenumber[lane], taps.footprint[lane]).clamp(0.0, 1.0);
+    for trains in waves.trains.chunks(4) {
+        let sums = sum::<1>(trains, &taps);
+        for (train, n) in trains.iter().zip(0..4) {
+            let phases = phases(train, &taps, &sums.cycles[n]);
+            let [mut amplitude, shore, wavenumber, _] = sums.others[n];
+            if taps.wide {
+                for lane in 0..BLOCK {
+                    amplitude[lane] *= left(wavenumber[lane], taps.footprint[lane]).clamp(0.0, 1.0);
+                }
             }
-        }
-        for lane in 0..BLOCK {
-            let (w, ..) = profile(phases[lane], shore[lane]);
-            up[lane] = amplitude[lane].mul_add(w, up[lane]);
+            for lane in 0..BLOCK {
+                let (w, ..) = profile(phases[lane], shore[lane]);
+                up[lane] = amplitude[lane].mul_add(w, up[lane]);
+            }
         }
     }
     for lane in 0..BLOCK {
@@ -256,7 +240,7 @@ pub(super) fn add_motion_body(waves: &Peachey, points: &Points, motion: &mut Mot
     let taps = taps::<3>(waves, points);
     let (mut up, mut tilt_x, mut tilt_y) = ([0f32; BLOCK], [0f32; BLOCK], [0f32; BLOCK]);
     for train in &waves.trains {
-        let sums = sum::<3>(train, &taps);
+        let sums = sum::<3>(from_ref(train), &taps);
         let phases = phases(train, &taps, &sums.cycles[0]);
         let [mut amplitude, shore, wavenumber, _] = sums.others[0];
         let (mut amplitude_x, mut amplitude_y) = (sums.others[1][AMPLITUDE], sums.others[2][AMPLITUDE]);
@@ -309,7 +293,7 @@ pub(super) fn add_velocity_body(waves: &Peachey, points: &Points, depths: &[f32;
     let taps = taps::<3>(waves, points);
     let (mut across, mut up, mut down) = ([0f32; BLOCK], [0f32; BLOCK], [0f32; BLOCK]);
     for train in &waves.trains {
-        let sums = sum::<3>(train, &taps);
+        let sums = sum::<3>(from_ref(train), &taps);
         let phases = phases(train, &taps, &sums.cycles[0]);
         let [amplitude, shore, wavenumber, bed] = sums.others[0];
         let frequency = (1.0 / train.swell.period) as f32;
