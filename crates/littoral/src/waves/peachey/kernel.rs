@@ -1,8 +1,9 @@
 //! What Peachey's waves answer, sixteen points at a time.
 //!
-//! A quadratic B-spline at a point is a sum over the nine nodes around. Points may lie anywhere, so each sums its own, and what a node tells
-//! lies along lanes: its phase is summed in `f64`, however many cycles it holds; amplitude, profile, wave number and depth together in `f32`. Rows of
-//! nodes come first, which slopes share with heights. What follows from these sums has points along lanes.
+//! A quadratic B-spline at a point is a sum over the nine nodes around. Points may lie anywhere, so each has its own nodes, and what one of these
+//! tells lies along lanes: amplitude, profile, wave number and depth are summed together in `f32`, and beside them its phase in `f64`, for it may
+//! be hundreds of cycles. Rows of three come first: slopes share them with heights. The sums are turned, and what follows from them has points
+//! along lanes.
 
 use super::{Node, Peachey, Train};
 use crate::waves::fft::kernel::transpose;
@@ -14,29 +15,25 @@ use std::slice::from_ref;
 
 type Lanes = [f32; BLOCK];
 
-/// What nodes tell beside their phase, in this order.
-const AMPLITUDE: usize = 0;
-const SHORE: usize = 1;
-const WAVENUMBER: usize = 2;
-const DEPTH: usize = 3;
-
 /// Points among the nodes of a bed.
+#[repr(C, align(64))]
 struct Taps {
     /// The first of the nodes around each, among those with a border.
     first: [u32; BLOCK],
-    /// From one row of these to the next.
-    stride: usize,
     across: Weights,
     up: Weights,
     /// From the first node of the bed (m).
     x: [f64; BLOCK],
     y: [f64; BLOCK],
     footprint: Lanes,
+    /// From one row of nodes to the next.
+    stride: usize,
     /// Whether any footprint is above 0.
     wide: bool,
 }
 
 /// Weights of the nodes before, at and after points along one axis, and their derivatives (1/m).
+#[repr(C, align(64))]
 struct Weights {
     of: [[f64; BLOCK]; 3],
     by: [[f64; BLOCK]; 3],
@@ -44,11 +41,21 @@ struct Weights {
     by_short: [Lanes; 3],
 }
 
-/// Sums over nodes: of phases (cycles) less those of the deep, and of all else. Four of each: values for up to four trains, or for one train values and derivatives
-/// eastward and northward.
+/// Four sums over the nodes around points: for up to four trains, or for one its values and their derivatives eastward and northward (1/m).
+#[repr(C, align(64))]
 struct Sums {
+    /// Phases (cycles) less those of the deep.
     cycles: [[f64; BLOCK]; 4],
-    others: [[Lanes; 4]; 4],
+    /// Four numbers of each: see [`Sums::others`].
+    others: [Lanes; BLOCK],
+}
+
+impl Sums {
+    /// Amplitude, profile, wave number and depth.
+    #[inline(always)]
+    fn others(&self, n: usize) -> [Lanes; 4] {
+        [0, 1, 2, 3].map(|i| self.others[4 * n + i])
+    }
 }
 
 /// Weights of points (m from the first node), and the nodes before them among those with a border.
@@ -82,6 +89,7 @@ fn weigh<const JETS: usize>(from: &[f64; BLOCK], spacing: f64, count: usize) -> 
     (weights, before)
 }
 
+/// Finds points among the nodes, with derivatives of weights if there are three jets.
 #[inline(always)]
 fn taps<const JETS: usize>(waves: &Peachey, points: &Points) -> Taps {
     let (mut x, mut y) = ([0.0; BLOCK], [0.0; BLOCK]);
@@ -106,11 +114,10 @@ fn taps<const JETS: usize>(waves: &Peachey, points: &Points) -> Taps {
     Taps { first, stride, across, up, x, y, footprint, wide }
 }
 
-/// Sums over the nodes around each point.
+/// Sums over the nodes around each point: with one jet for up to four trains, with three for one.
 #[inline(always)]
 fn sum<const JETS: usize>(trains: &[Train], taps: &Taps) -> Sums {
-    let mut cycles = [[0.0; BLOCK]; 4];
-    let mut table = [[0f32; BLOCK]; BLOCK];
+    let mut sums = Sums { cycles: [[0.0; BLOCK]; 4], others: [[0.0; BLOCK]; BLOCK] };
     for lane in 0..BLOCK {
         for (train, first) in trains.iter().zip((0..4).step_by(JETS)) {
             let mut long = [0f64; JETS];
@@ -149,19 +156,16 @@ fn sum<const JETS: usize>(trains: &[Train], taps: &Taps) -> Sums {
                 }
             }
             for jet in 0..JETS {
-                cycles[first + jet][lane] = long[jet];
+                sums.cycles[first + jet][lane] = long[jet];
                 for n in 0..4 {
-                    table[lane][4 * (first + jet) + n] = short[jet][n];
+                    sums.others[lane][4 * (first + jet) + n] = short[jet][n];
                 }
             }
         }
     }
-    transpose(&mut table);
-    let mut others = [[[0f32; BLOCK]; 4]; 4];
-    for n in 0..BLOCK {
-        others[n / 4][n % 4] = table[n];
-    }
-    Sums { cycles, others }
+    // Till now each point had its row.
+    transpose(&mut sums.others);
+    sums
 }
 
 /// Phases (cycles within ±½).
@@ -176,8 +180,8 @@ fn phases(train: &Train, taps: &Taps, cycles: &[f64; BLOCK]) -> Lanes {
     phases
 }
 
-/// How much of waves of a wave number is left in a footprint: none of those shorter than twice the footprint, all of those twice as long again.
-/// Before it is clamped to [0, 1].
+/// How much of waves of a wave number is left in a footprint, before it is clamped to [0, 1]: none of those shorter than twice the footprint, all of
+/// those twice as long again.
 #[inline(always)]
 fn left(wavenumber: f32, footprint: f32) -> f32 {
     PI / (wavenumber * footprint) - 1.0
@@ -213,7 +217,7 @@ pub(super) fn add_displacement_body(waves: &Peachey, points: &Points, motion: &m
         let sums = sum::<1>(trains, &taps);
         for (train, n) in trains.iter().zip(0..4) {
             let phases = phases(train, &taps, &sums.cycles[n]);
-            let [mut amplitude, shore, wavenumber, _] = sums.others[n];
+            let [mut amplitude, shore, wavenumber, _] = sums.others(n);
             if taps.wide {
                 for lane in 0..BLOCK {
                     amplitude[lane] *= left(wavenumber[lane], taps.footprint[lane]).clamp(0.0, 1.0);
@@ -242,10 +246,9 @@ pub(super) fn add_motion_body(waves: &Peachey, points: &Points, motion: &mut Mot
     for train in &waves.trains {
         let sums = sum::<3>(from_ref(train), &taps);
         let phases = phases(train, &taps, &sums.cycles[0]);
-        let [mut amplitude, shore, wavenumber, _] = sums.others[0];
-        let (mut amplitude_x, mut amplitude_y) = (sums.others[1][AMPLITUDE], sums.others[2][AMPLITUDE]);
-        let (shore_x, shore_y) = (sums.others[1][SHORE], sums.others[2][SHORE]);
-        let (number_x, number_y) = (sums.others[1][WAVENUMBER], sums.others[2][WAVENUMBER]);
+        let [mut amplitude, shore, wavenumber, _] = sums.others(0);
+        let [mut amplitude_x, shore_x, wavenumber_x, _] = sums.others(1);
+        let [mut amplitude_y, shore_y, wavenumber_y, _] = sums.others(2);
         let (mut x, mut y) = ([0f32; BLOCK], [0f32; BLOCK]);
         for lane in 0..BLOCK {
             x[lane] = (train.far.x + sums.cycles[1][lane]) as f32;
@@ -261,8 +264,8 @@ pub(super) fn add_motion_body(waves: &Peachey, points: &Points, motion: &mut Mot
                 motion.hidden_yy[lane] = lost.mul_add(y[lane] * y[lane], motion.hidden_yy[lane]);
                 // ∂left/∂k = −(left + 1) / k.
                 let fading = if whole > 0.0 && whole < 1.0 { -(whole + 1.0) / wavenumber[lane] } else { 0.0 };
-                amplitude_x[lane] = left.mul_add(amplitude_x[lane], amplitude[lane] * fading * number_x[lane]);
-                amplitude_y[lane] = left.mul_add(amplitude_y[lane], amplitude[lane] * fading * number_y[lane]);
+                amplitude_x[lane] = left.mul_add(amplitude_x[lane], amplitude[lane] * fading * wavenumber_x[lane]);
+                amplitude_y[lane] = left.mul_add(amplitude_y[lane], amplitude[lane] * fading * wavenumber_y[lane]);
                 amplitude[lane] *= left;
             }
         }
@@ -282,7 +285,6 @@ pub(super) fn add_motion_body(waves: &Peachey, points: &Points, motion: &mut Mot
     }
 }
 
-/// As under a linear wave of the local length that has the profile's surface.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
 pub(super) fn add_velocity(waves: &Peachey, points: &Points, depths: &[f32; BLOCK], velocity: &mut Velocity) {
     add_velocity_body(waves, points, depths, velocity);
@@ -295,7 +297,7 @@ pub(super) fn add_velocity_body(waves: &Peachey, points: &Points, depths: &[f32;
     for train in &waves.trains {
         let sums = sum::<3>(from_ref(train), &taps);
         let phases = phases(train, &taps, &sums.cycles[0]);
-        let [amplitude, shore, wavenumber, bed] = sums.others[0];
+        let [amplitude, shore, wavenumber, bed] = sums.others(0);
         let frequency = (1.0 / train.swell.period) as f32;
         for lane in 0..BLOCK {
             let left = left(wavenumber[lane], taps.footprint[lane]).clamp(0.0, 1.0);
