@@ -5,6 +5,8 @@
 //! be hundreds of cycles. Rows of three come first: slopes share them with heights. The sums are turned, and what follows from them has points
 //! along lanes.
 
+#![allow(clippy::needless_range_loop, reason = "lanes of several arrays are told apart by their number")]
+
 use super::{Node, Peachey, Train};
 use crate::waves::fft::kernel::transpose;
 use crate::waves::sum::{circle, power_of_two};
