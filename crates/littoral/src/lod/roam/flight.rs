@@ -22,7 +22,7 @@
 
 use super::CORNERS;
 use super::bounds::{Bound, NestedBounds};
-use super::diamond::{Diamond, FINEST, Point, STEPS};
+use super::diamond::{Base, Diamond, FINEST, Point, STEPS};
 use super::factors::Factors;
 use super::ground::Ground;
 use super::scan::{Between, Item, Lens, List, MERGE, NOWHERE, Priority, SPLIT, STUCK};
@@ -38,6 +38,7 @@ mod drawn;
 mod foresight;
 mod queues;
 mod sea;
+mod step;
 #[cfg(test)]
 mod tests;
 
@@ -388,139 +389,6 @@ impl<G: Ground> RoamFlight<'_, G> {
         let known = &mut self.records[record as usize];
         known.list = NOWHERE;
         self.list.remove(known.place);
-    }
-
-    /// Vertices at the apexes.
-    fn apexes(&self, known: &Record, diamond: Diamond) -> [u32; 2] {
-        if diamond == Diamond::ROOT {
-            return [1, 3];
-        }
-        known.parents.map(|parent| if parent == NONE { NONE } else { self.records[parent as usize].triangles[0] })
-    }
-
-    /// A child's other parent, if there is a record of it.
-    #[inline(always)]
-    fn beyond(&self, known: &Record, diamond: Diamond, child: usize) -> u32 {
-        let (through, other) = diamond.beyond(child);
-        // At the border there is one parent only, whichever side it is on.
-        let parent = known.parents[through & usize::from(known.parents[1] != NONE)];
-        self.records.get(parent as usize).map_or(NONE, |parent| parent.children[other])
-    }
-
-    /// The record of a split diamond's child, if the child's other parent has made it.
-    #[inline(always)]
-    fn met(&self, known: &Record, diamond: Diamond, child: usize) -> Option<u32> {
-        let other = self.beyond(known, diamond, child);
-        let other = self.records.get(other as usize).filter(|other| other.split)?;
-        Some(other.children[child ^ 2]).filter(|&child| child != NONE)
-    }
-
-    /// Splits a diamond that has both triangles.
-    fn split(&mut self, record: u32) {
-        let known = self.records[record as usize];
-        let diamond = Diamond::at(known.at);
-        self.operations.0 += 1;
-        self.triangles += cost(&known, diamond);
-        self.freed.extend(known.triangles.into_iter().filter(|&slot| slot != NONE));
-        let vertex = self.vertex(known.at);
-        let slot = match self.unused_vertices.pop() {
-            Some(slot) => {
-                self.mesh.vertices[slot as usize] = vertex;
-                self.makers[slot as usize] = record;
-                slot
-            }
-            None => {
-                self.mesh.vertices.push(vertex);
-                self.makers.push(record);
-                self.mesh.vertices.len() as u32 - 1
-            }
-        };
-        Changes::mark(&mut self.changed.vertices, slot);
-        let own = &mut self.records[record as usize];
-        (own.split, own.triangles) = (true, [slot, NONE]);
-        for parent in known.parents {
-            if parent != NONE {
-                self.records[parent as usize].kids += 1;
-                if self.records[parent as usize].list == MERGE {
-                    self.leave(parent);
-                }
-            }
-        }
-        let [a, b] = known.ends;
-        let [p, q] = self.apexes(&known, diamond);
-        let corners = [a, b, p, if q == NONE { p } else { q }];
-        for i in 0..4 {
-            let Some(child) = diamond.child(i) else { continue };
-            let ends = diamond.child_ends(corners, i);
-            let of = match self.met(&known, diamond, i) {
-                Some(of) => of,
-                None => self.record(child, ends),
-            };
-            let border = at_border(child);
-            let side = if border { 0 } else { diamond.side_of(i) };
-            self.records[record as usize].children[i] = of;
-            let held = &mut self.records[of as usize];
-            held.parents[side] = record;
-            held.held += 1;
-            let complete = held.held == if border { 1 } else { 2 };
-            if held.bound.whole(side) {
-                let [a, b] = ends;
-                self.put(of, side, if i < 2 { [a, b, slot] } else { [b, a, slot] });
-            }
-            if complete {
-                let list = self.idle(child);
-                self.join(of, list);
-            }
-        }
-        self.turn(record, diamond, MERGE);
-    }
-
-    /// Merges a split diamond that has no split child.
-    fn merge(&mut self, record: u32) {
-        let known = self.records[record as usize];
-        let diamond = Diamond::at(known.at);
-        self.operations.1 += 1;
-        self.triangles -= cost(&known, diamond);
-        for child in known.children {
-            if child == NONE {
-                continue;
-            }
-            let of = &mut self.records[child as usize];
-            let side = usize::from(of.parents[0] != record);
-            if of.triangles[side] != NONE {
-                self.freed.push(of.triangles[side]);
-                of.triangles[side] = NONE;
-            }
-            of.parents[side] = NONE;
-            of.held -= 1;
-            let (list, held) = (of.list, of.held);
-            if list != NOWHERE {
-                self.leave(child);
-            }
-            if held == 0 {
-                self.unused.push(child);
-            }
-        }
-        self.bounds.forget(known.triangles[0]);
-        self.unused_vertices.push(known.triangles[0]);
-        let own = &mut self.records[record as usize];
-        (own.split, own.triangles, own.children) = (false, [NONE; 2], [NONE; 4]);
-        let apexes = self.apexes(&known, diamond);
-        for (side, apex) in apexes.into_iter().enumerate() {
-            if apex != NONE {
-                self.draw(record, diamond, side, apex);
-            }
-        }
-        let kind = self.idle(diamond);
-        self.turn(record, diamond, kind);
-        for parent in known.parents {
-            if parent != NONE {
-                self.records[parent as usize].kids -= 1;
-                if self.records[parent as usize].kids == 0 {
-                    self.join(parent, MERGE);
-                }
-            }
-        }
     }
 }
 
