@@ -359,12 +359,19 @@ impl<G: Ground> RoamFlight<'_, G> {
         self.enqueue(record, diamond, kind, priority);
     }
 
-    /// Makes a record one of another kind; of what it is its priority says all.
+    /// Makes a record one of another kind. Where priorities may be old its own is measured anew: children are measured when they are made, and a parent below them
+    /// would be merged and split for ever.
     fn turn(&mut self, record: u32, diamond: Diamond, kind: u8) {
         let known = &mut self.records[record as usize];
         known.list = kind;
-        self.list.turn(known.place, kind);
-        let priority = self.list.priority(known.place);
+        let place = known.place;
+        let priority = match &self.lens {
+            Some(lens) if self.groups > 1 => {
+                self.bounds.priority(lens, self.list.item(place), self.bounds.slopes(diamond))
+            }
+            _ => self.list.priority(place),
+        };
+        self.list.turn(place, priority, kind);
         self.enqueue(record, diamond, kind, priority);
     }
 

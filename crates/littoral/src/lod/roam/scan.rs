@@ -203,9 +203,8 @@ impl List {
     }
 
     /// Makes an entry one of another kind.
-    pub(super) fn turn(&mut self, place: u32, kind: u8) {
-        let number = &mut self.numbers[place as usize];
-        *number = marked(number.abs(), kind);
+    pub(super) fn turn(&mut self, place: u32, priority: f32, kind: u8) {
+        self.numbers[place as usize] = marked(priority, kind);
     }
 
     /// Removes one.

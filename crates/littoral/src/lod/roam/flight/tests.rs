@@ -278,6 +278,60 @@ proptest! {
     }
 }
 
+/// The triangles of the mesh whose split diamonds these are.
+fn leaves<G: Ground>(flight: &RoamFlight<'_, G>, split: &BTreeSet<Point>) -> BTreeSet<[Point; 3]> {
+    let mut all = BTreeSet::new();
+    let mut add = |diamond: Diamond, side: usize, apex: Point| {
+        if !split.contains(&diamond.at) && flight.bounds.bound(diamond).whole(side) {
+            all.insert(turned(diamond.triangle(apex)));
+        }
+    };
+    for (side, apex) in Diamond::ROOT.apexes().into_iter().enumerate() {
+        add(Diamond::ROOT, side, apex.expect("a root has both"));
+    }
+    for &at in split {
+        for child in Diamond::at(at).children().into_iter().flatten() {
+            let side = child.apexes().iter().position(|apex| *apex == Some(at)).expect("a parent");
+            add(child, side, at);
+        }
+    }
+    all
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(cases()))]
+
+    /// Where priorities are old the mesh has no gaps, and when all are known it is that of Algorithm I.
+    #[test]
+    fn deferred_groups_catch_up(
+        heights in prop::collection::vec(prop_oneof![19 => 0f32..60.0, 1 => Just(f32::NAN)], 17 * 17),
+        groups in 2u32..7,
+        budget in prop_oneof![2usize..300, Just(100_000)],
+        tolerance in 0.3f32..20.0,
+        views in prop::collection::vec(((-0.5f64..1.5, -0.5f64..1.5, -20f64..120.0), (0f64..6.3, -1.5f64..0.5)), 2..9),
+    ) {
+        let land = land(17, 17, &heights);
+        let bounds = NestedBounds::of(&land).expect("few samples");
+        let mut flight = RoamFlight::over(&bounds, Limits { finest: 30, triangles: budget });
+        flight.groups = groups;
+        let last = views.len() - 1;
+        for (i, ((u, v, up), (yaw, pitch))) in views.into_iter().enumerate() {
+            let eye = (land.origin() + land.extent() * DVec2::new(u, v)).extend(up);
+            let ahead = DVec3::new(yaw.cos() * pitch.cos(), yaw.sin() * pitch.cos(), pitch.sin());
+            let mut view = View::looking_at(eye, eye + ahead, 1.0, UVec2::new(320, 200));
+            view.tolerance_pixels = tolerance;
+            for _ in 0..if i == last { 4 * groups + 4 } else { 1 } {
+                flight.update(&view, &mut || false).expect("a view");
+                let split = split_set(&flight);
+                prop_assert!(split.iter().all(|&at| Diamond::at(at).parents().iter().flatten().all(|p| split.contains(&p.at))));
+                prop_assert_eq!(drawn(&flight), leaves(&flight, &split));
+                prop_assert!(flight.triangles() <= budget.max(2));
+            }
+        }
+        prop_assert_eq!(drawn(&flight), algorithm_one(&flight).0);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(cases()))]
 
