@@ -106,11 +106,13 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
         let on_lattice = |i: &usize| glam::UVec2::from(points[*i]).as_dvec2() == places[*i].uv * f64::from(1u32 << 30);
         for some in [vec![0, 4, 20, 24], (0..25).collect::<Vec<usize>>()] {
             let some: Vec<usize> = some.into_iter().filter(on_lattice).collect();
-            let mut heights = vec![0.0; some.len()];
-            field.lattice(0, &some.iter().map(|&i| points[i]).collect::<Vec<_>>(), &mut heights);
-            for (&i, height) in some.iter().zip(&heights) {
+            let mut vertices = Vec::new();
+            field.raise(3, &some.iter().map(|&i| points[i]).collect::<Vec<_>>(), &mut vertices);
+            assert_eq!(vertices.len(), some.len());
+            for (&i, vertex) in some.iter().zip(&vertices) {
                 let canonical = |h: f32| if h.is_nan() { f32::NAN.to_bits() } else { h.to_bits() };
-                assert_eq!(canonical(*height), canonical(bulk[i]), "{:?} of the lattice", points[i]);
+                assert_eq!(([vertex.x, vertex.y], vertex.face), (points[i], 3));
+                assert_eq!(canonical(vertex.height), canonical(bulk[i]), "{:?} of the lattice", points[i]);
             }
         }
         for (i, place) in places.iter().enumerate() {

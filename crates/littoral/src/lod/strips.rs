@@ -19,11 +19,11 @@ use super::{Drawing, Limits, Lod, Reached, ScreenMetric, ViewError};
 use crate::field::HeightField;
 use crate::space::{Cell, Datum, View};
 use glam::DVec2;
-use multiversion::multiversion;
 use page::{Asked, DEPTH, Page, SEAMS, halve};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use walk::{Beyond, Rows, Trail, Walk};
+use stage::Rows;
+use walk::{Beyond, Trail, Walk, Way};
 
 /// Strips of triangles, page by page.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ struct Tier {
 /// What a walk brings home.
 #[derive(Clone, Debug, Default)]
 struct Walked {
-    rows: Rows,
+    way: Way,
     trail: Trail,
     vertices: Vec<Vertex>,
     ends: Vec<u32>,
@@ -99,23 +99,32 @@ impl Tier {
         let pages = self.pages().iter().enumerate();
         doubts.extend(pages.filter(|(_, page)| page.doubt > worst).map(|(number, page)| (page.doubt, number)));
         doubts.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut rows = Rows::default();
         for &(doubt, number) in &doubts {
             if doubt <= worst {
                 break;
             }
-            worst = self.pages[number].resolve(asked).max(worst);
+            worst = self.pages[number].resolve(asked, &mut rows).max(worst);
         }
         self.doubts = doubts;
         worst
     }
 
     /// Does something with every page, on several threads if there are many.
-    fn each<T: Send>(&mut self, work: impl Fn(&mut Page) -> T + Sync + Send, join: fn(T, T) -> T) -> Option<T> {
+    fn each<T: Send>(
+        &mut self,
+        work: impl Fn(&mut Page, &mut Rows) -> T + Sync + Send,
+        join: fn(T, T) -> T,
+    ) -> Option<T> {
+        let some = |pages: &mut [Page]| {
+            let mut rows = Rows::default();
+            pages.iter_mut().map(|page| work(page, &mut rows)).reduce(join)
+        };
         let pages = &mut self.pages[..self.used];
-        if pages.len() < FEW {
-            pages.iter_mut().map(work).reduce(join)
+        if pages.len() < FEW || rayon::current_num_threads() == 1 {
+            some(pages)
         } else {
-            pages.par_iter_mut().map(work).reduce_with(join)
+            pages.par_chunks_mut(FEW / 4).filter_map(some).reduce_with(join)
         }
     }
 }
@@ -135,7 +144,7 @@ impl Strips {
         tolerance: f32,
     ) -> Result<(f32, usize), usize> {
         let finest = self.limits.finest.min(Cell::MAX_LEVEL);
-        let asked = Asked { field, metric, tolerance, finest };
+        let asked = Asked::new(field, metric, tolerance, finest);
         // Pages end at the finest level; the first takes what is left above them.
         let tiers = usize::from(finest.div_ceil(DEPTH));
         self.tiers.resize_with(tiers, Tier::default);
@@ -154,7 +163,7 @@ impl Strips {
         for i in 0..tiers {
             let (coarse, fine) = self.tiers.split_at_mut(i + 1);
             let tier = &mut coarse[i];
-            worst = tier.each(|page| page.refine(&asked), f32::max).map_or(worst, |bound| bound.max(worst));
+            worst = tier.each(|page, rows| page.refine(&asked, rows), f32::max).map_or(worst, |bound| bound.max(worst));
             worst = tier.resolve(&asked, worst);
             leaves += tier.pages().iter().map(Page::count).sum::<usize>();
             let pages = tier.pages().iter().map(Page::below).sum::<usize>();
@@ -168,8 +177,8 @@ impl Strips {
         self.balance();
         let mut cells = 0;
         for tier in &mut self.tiers {
-            let settle = |page: &mut Page| {
-                page.settle(&asked);
+            let settle = |page: &mut Page, rows: &mut Rows| {
+                page.settle(&asked, rows);
                 page.count()
             };
             cells += tier.each(settle, |a, b| a + b).unwrap_or(0);
@@ -332,7 +341,7 @@ impl Strips {
             if field.error(Cell::face(0)).is_finite() {
                 let corners = [[0, STEPS], [0, 0], [STEPS, STEPS], [STEPS, 0]];
                 drawing.strips.push(4);
-                raise(field, 0, &corners, &mut drawing.mesh.vertices);
+                field.raise(0, &corners, &mut drawing.mesh.vertices);
             }
             return;
         }
@@ -378,9 +387,9 @@ impl Walked {
             let (points, strips) = self.trail.strips();
             let begun = vertices.len() as u32;
             ends.extend(strips.iter().map(|end| begun + end));
-            raise(field, face, points, vertices);
+            field.raise(face, points, vertices);
             for sliver in self.trail.slivers() {
-                raise(field, face, sliver, vertices);
+                field.raise(face, sliver, vertices);
                 ends.push(vertices.len() as u32);
             }
         }
@@ -405,34 +414,11 @@ impl Walked {
             };
             Beyond { page, cell }
         });
-        self.rows.load(page, beyond, turned);
+        self.way.load(page, beyond, turned);
         let side = STEPS >> level;
         let corner = [x, y].map(|at| (at + u32::from(turned)) * side);
         let side = if turned { side.wrapping_neg() } else { side };
-        Walk { rows: &self.rows, trail: &mut self.trail, corner, side }.run();
+        Walk { way: &self.way, trail: &mut self.trail, corner, side }.run();
         face
-    }
-}
-
-/// Adds vertices at points of the lattice, with their heights.
-fn raise(field: &dyn HeightField, face: u8, points: &[[u32; 2]], vertices: &mut Vec<Vertex>) {
-    const SOME: usize = 256;
-    let mut heights = [0.0; SOME];
-    let mut some = [Vertex { x: 0, y: 0, face: face.into(), height: 0.0 }; SOME];
-    for points in points.chunks(SOME) {
-        let (heights, some) = (&mut heights[..points.len()], &mut some[..points.len()]);
-        field.lattice(face, points, heights);
-        weave(face.into(), points, bytemuck::cast_slice(heights), bytemuck::cast_slice_mut(some));
-        vertices.extend_from_slice(some);
-    }
-}
-
-/// Puts points and heights together, as the numbers that vertices are.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn weave(face: u32, points: &[[u32; 2]], heights: &[u32], vertices: &mut [[u32; 4]]) {
-    let count = vertices.len();
-    let (points, heights) = (&points[..count], &heights[..count]);
-    for i in 0..count {
-        vertices[i] = [points[i][0], points[i][1], face, heights[i]];
     }
 }

@@ -20,7 +20,7 @@ const ROWS: usize = (2 << DEPTH) + DEPTH as usize;
 
 /// A page as it is walked: rows and columns in the order of the walk, and what is beyond its sides.
 #[derive(Clone, Debug)]
-pub(super) struct Rows {
+pub(super) struct Way {
     depth: u8,
     /// What is cut: row −1 is that of the page above.
     cut: [u64; ROWS],
@@ -42,13 +42,13 @@ fn index(level: u8, y: i64) -> usize {
     ((1i64 << level) + i64::from(level) + y) as usize
 }
 
-impl Default for Rows {
-    fn default() -> Rows {
-        Rows { depth: 0, cut: [0; ROWS], drawn: [0; ROWS] }
+impl Default for Way {
+    fn default() -> Way {
+        Way { depth: 0, cut: [0; ROWS], drawn: [0; ROWS] }
     }
 }
 
-impl Rows {
+impl Way {
     /// A page between its neighbours to the south, east, north and west, to be walked north- and eastward, or, if `turned`, south- and westward.
     pub fn load(&mut self, page: &Page, beyond: [Beyond; 4], turned: bool) {
         self.depth = page.depth;
@@ -177,7 +177,7 @@ impl Trail {
 
 /// One who walks over a page.
 pub(super) struct Walk<'a> {
-    pub rows: &'a Rows,
+    pub way: &'a Way,
     pub trail: &'a mut Trail,
     /// Lattice point where the walk begins.
     pub corner: Point,
@@ -213,7 +213,7 @@ impl Walk<'_> {
 
     /// Walks along row `y` of a level, from column `from` to before column `to`; all cells there exist.
     fn row(&mut self, level: u8, y: u32, from: u32, to: u32) {
-        let cut = self.rows.cut(level, y.into());
+        let cut = self.way.cut(level, y.into());
         let row = self.sides(level, y, from..to);
         let run = |bits: u64, x: u32| bits.unbounded_shr(x).trailing_ones().min(to - x);
         let mut x = from;
@@ -226,7 +226,7 @@ impl Walk<'_> {
             let finer = run(cut, x);
             if finer > 0 {
                 // (d): the upper row goes on, the lower begins, and goes on after (e). Those of the last level are pages.
-                if level < self.rows.depth {
+                if level < self.way.depth {
                     self.row(level + 1, 2 * y, 2 * x, 2 * (x + finer));
                     self.row(level + 1, 2 * y + 1, 2 * x, 2 * (x + finer));
                 }
@@ -241,18 +241,18 @@ impl Walk<'_> {
         let width = (self.side as i32 >> level) as u32;
         let above = self.corner[1].wrapping_add(y.wrapping_mul(width));
         let y = i64::from(y);
-        let (drawn, finer, upper) = (self.rows.drawn(level, y, 0), self.rows.cut(level, y - 1), y & 1 == 0);
+        let (drawn, finer, upper) = (self.way.drawn(level, y, 0), self.way.cut(level, y - 1), y & 1 == 0);
         let mut row =
             Row { width, above, below: above.wrapping_add(width), upper, drawn, before: 0, after: 0, over: 0, finer };
         if level == 0 {
             return row;
         }
-        let coarse = |y: i64, column: i32| double(self.rows.drawn(level - 1, y, column));
+        let coarse = |y: i64, column: i32| double(self.way.drawn(level - 1, y, column));
         let before = drawn & coarse(y >> 1, -1) & EVEN;
         let after = drawn & coarse(y >> 1, 1) & !EVEN;
         let over = if upper { drawn & coarse((y >> 1) - 1, 0) } else { 0 };
         // A side leaves out its middle if both of its cells are drawn.
-        let column = self.rows.drawn(level, y ^ 1, 0);
+        let column = self.way.drawn(level, y ^ 1, 0);
         let line = drawn >> 1 & EVEN | (drawn & EVEN) << 1;
         (row.before, row.after, row.over) = (before & column, after & column, over & line);
         let alone = [before & !column, after & !column, over & !line];
