@@ -81,7 +81,9 @@ impl ErrorPyramid {
         let inside = if row < level.rows { level.columns.saturating_sub(column).min(errors.len()) } else { 0 };
         let (within, beyond) = errors.split_at_mut(inside);
         if inside > 0 {
-            within.copy_from_slice(&level.bounds[row * level.columns + column..][..inside]);
+            let bounds = &level.bounds[row * level.columns + column..];
+            within.copy_from_slice(&bounds[..inside]);
+            ask_for(&bounds[inside..], inside);
         }
         beyond.fill(0.0);
         true
@@ -177,6 +179,18 @@ impl ErrorPyramid {
         };
         own.max(self.children(raster, k, x, y))
     }
+}
+
+/// Asks for the next numbers of a row, which who looked at those before looks at next.
+fn ask_for(next: &[f32], count: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for number in next[..count.min(next.len())].chunks(16).filter_map(|line| line.last()) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: neither reads nor writes.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(number).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (next, count);
 }
 
 enum Coverage {
