@@ -137,11 +137,12 @@ impl Samples<'_> {
                 }
             }
         }
-        // SAFETY: these were just written; others see them after the fence.
-        unsafe {
+        if !eights.is_empty() {
+            // Others see what went past the caches after the fence.
             _mm_sfence();
-            vertices.set_len(length + 8 * eights.len());
         }
+        // SAFETY: these were just written.
+        unsafe { vertices.set_len(length + 8 * eights.len()) };
         all == 0xff && self.pick(face, rest, vertices)
     }
 }

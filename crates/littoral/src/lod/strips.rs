@@ -19,7 +19,7 @@ use super::{Drawing, Limits, Lod, Reached, ScreenMetric, ViewError};
 use crate::field::HeightField;
 use crate::space::{Cell, Datum, View};
 use glam::DVec2;
-use page::{Asked, DEPTH, Page, SEAMS, halve};
+use page::{Asked, DEPTH, Page, SEAMS, UNKNOWN, halve};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use stage::Rows;
@@ -48,7 +48,16 @@ struct Tier {
     index: FxHashMap<[u32; 2], u32>,
     /// Pages by how doubtful their bounds are (pixels).
     doubts: Vec<(f32, usize)>,
+    /// The last level of which anything is cut, page by page, while neighbours cut each other.
+    lasts: Vec<u8>,
 }
+
+/// Sides of a page, and which is beyond them.
+const SOUTH: usize = 0;
+const EAST: usize = 1;
+const NORTH: usize = 2;
+const WEST: usize = 3;
+const BESIDE: [(i32, i32); 4] = [(0, -1), (1, 0), (0, 1), (-1, 0)];
 
 /// What a walk brings home.
 #[derive(Clone, Debug, Default)]
@@ -163,10 +172,14 @@ impl Strips {
         for i in 0..tiers {
             let (coarse, fine) = self.tiers.split_at_mut(i + 1);
             let tier = &mut coarse[i];
-            worst = tier.each(|page, rows| page.refine(&asked, rows), f32::max).map_or(worst, |bound| bound.max(worst));
-            worst = tier.resolve(&asked, worst);
-            leaves += tier.pages().iter().map(Page::count).sum::<usize>();
-            let pages = tier.pages().iter().map(Page::below).sum::<usize>();
+            let refine = |page: &mut Page, rows: &mut Rows| {
+                let bound = page.refine(&asked, rows);
+                (bound, page.count(), page.below())
+            };
+            let join = |a: (f32, usize, usize), b: (f32, usize, usize)| (a.0.max(b.0), a.1 + b.1, a.2 + b.2);
+            let (bound, drawn, pages) = tier.each(refine, join).unwrap_or_default();
+            worst = tier.resolve(&asked, bound.max(worst));
+            leaves += drawn;
             if leaves + 3 * pages > most {
                 return Err(leaves + 3 * pages);
             }
@@ -234,10 +247,15 @@ impl Strips {
                     tier.page(above).mark(up, y & mask, 1 << (x & mask));
                 }
             }
+            let Tier { pages, used, lasts, .. } = tier;
+            lasts.clear();
+            lasts.extend(pages[..*used].iter().map(|page| page.last));
             for level in (1..=tier.depth).rev() {
                 let mut number = 0;
                 while number < tier.used {
-                    tier.grow(number, level);
+                    if tier.lasts[number] >= level {
+                        tier.grow(number, level);
+                    }
                     number += 1;
                 }
             }
@@ -266,9 +284,6 @@ impl Tier {
         let cell = self.pages[number].cell;
         let cells = 1u32 << cell.level;
         let half = side / 2;
-        if self.pages[number].last < level {
-            return;
-        }
         // Rows with a cut cell at the western and at the eastern side.
         let (mut western, mut eastern) = (0, 0);
         for y in 0..side {
@@ -282,20 +297,38 @@ impl Tier {
                 page.mark(level - 1, beyond >> 1, halve(bits));
             }
             if y == 0 && cell.y > 0 {
-                self.page(Cell { y: cell.y - 1, ..cell }).mark(level - 1, half - 1, halve(bits));
+                self.mark(number, SOUTH, level - 1, half - 1, halve(bits));
             }
             if y == side - 1 && cell.y + 1 < cells {
-                self.page(Cell { y: cell.y + 1, ..cell }).mark(level - 1, 0, halve(bits));
+                self.mark(number, NORTH, level - 1, 0, halve(bits));
             }
             western |= (bits & 1) << y;
             eastern |= (bits >> (side - 1) & 1) << y;
         }
-        let west = cell.x.checked_sub(1).map(|x| (x, western, half - 1));
-        let east = Some((cell.x + 1, eastern, 0)).filter(|&(x, ..)| x < cells);
-        for (x, rows, column) in [west, east].into_iter().flatten().filter(|&(_, rows, _)| rows != 0) {
-            let (beside, rows) = (self.page(Cell { x, ..cell }), halve(rows));
-            (0..half).filter(|y| rows >> y & 1 == 1).for_each(|y| beside.mark(level - 1, y, 1 << column));
+        let west = Some((WEST, western, half - 1)).filter(|_| cell.x > 0);
+        let east = Some((EAST, eastern, 0)).filter(|_| cell.x + 1 < cells);
+        for (side, rows, column) in [west, east].into_iter().flatten().filter(|&(_, rows, _)| rows != 0) {
+            let rows = halve(rows);
+            (0..half).filter(|y| rows >> y & 1 == 1).for_each(|y| self.mark(number, side, level - 1, y, 1 << column));
         }
+    }
+
+    /// Cuts cells of the page beside one, made if it is not there.
+    fn mark(&mut self, number: usize, side: usize, level: u8, y: u32, bits: u64) {
+        let Page { cell, beside, .. } = self.pages[number];
+        let mut other = beside[side] as usize;
+        if beside[side] == UNKNOWN {
+            let (i, j) = BESIDE[side];
+            let (x, y) = (cell.x.wrapping_add_signed(i), cell.y.wrapping_add_signed(j));
+            self.page(Cell { x, y, ..cell });
+            let found = self.index[&[x, y]];
+            self.pages[number].beside[side] = found;
+            self.pages[found as usize].beside[(side + 2) % 4] = number as u32;
+            other = found as usize;
+            self.lasts.resize(self.used, 0);
+        }
+        self.pages[other].mark(level, y, bits);
+        self.lasts[other] = self.pages[other].last;
     }
 }
 
@@ -382,8 +415,12 @@ impl Walked {
         vertices: &mut Vec<Vertex>,
         ends: &mut Vec<u32>,
     ) {
-        for &(_, tier, number) in pages {
+        self.trail.clear();
+        for (i, &(_, tier, number)) in pages.iter().enumerate() {
             let face = self.page(tiers, [tier, number].map(|i| i as usize), turned);
+            if !self.trail.is_enough() && i + 1 < pages.len() {
+                continue;
+            }
             let (points, strips) = self.trail.strips();
             let begun = vertices.len() as u32;
             ends.extend(strips.iter().map(|end| begun + end));
@@ -392,6 +429,7 @@ impl Walked {
                 field.raise(face, sliver, vertices);
                 ends.push(vertices.len() as u32);
             }
+            self.trail.clear();
         }
     }
 
@@ -399,8 +437,12 @@ impl Walked {
     fn page(&mut self, tiers: &[Tier], [tier, number]: [usize; 2], turned: bool) -> u8 {
         let page = &tiers[tier].pages[number];
         let Cell { x, y, level, face } = page.cell;
-        let beyond = [(0i64, -1i64), (1, 0), (0, 1), (-1, 0)].map(|(i, j)| {
-            let [x, y] = [i64::from(x) + i, i64::from(y) + j];
+        let beyond = [SOUTH, EAST, NORTH, WEST].map(|side| {
+            if page.beside[side] != UNKNOWN {
+                return Beyond { page: Some(&tiers[tier].pages[page.beside[side] as usize]), cell: false };
+            }
+            let (i, j) = BESIDE[side];
+            let [x, y] = [i64::from(x) + i64::from(i), i64::from(y) + i64::from(j)];
             if !(0..1i64 << level).contains(&x) || !(0..1i64 << level).contains(&y) {
                 return Beyond::default();
             }

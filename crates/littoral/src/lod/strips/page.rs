@@ -13,6 +13,9 @@ use glam::DVec2;
 use multiversion::multiversion;
 use std::ops::Range;
 
+/// The number of no page.
+pub(super) const UNKNOWN: u32 = u32::MAX;
+
 /// Levels within a page, and its cells along a side.
 pub(super) const DEPTH: u8 = 6;
 pub(super) const SIDE: usize = 1 << DEPTH;
@@ -40,6 +43,8 @@ pub(super) struct Page {
     pub drawn: [u64; ROWS],
     /// How it lies before the eye, once it was asked for.
     stage: Option<Stage>,
+    /// Pages beside it to the south, east, north and west, once they were looked for.
+    pub beside: [u32; 4],
     /// What the bounds (pixels) of its cells that cannot be cut do not exceed, if they were not asked for.
     pub doubt: f32,
 }
@@ -107,7 +112,8 @@ fn count(drawn: &[u64], cut: &[u64]) -> usize {
 impl Page {
     /// A page of which only the square itself is cut.
     pub fn of(cell: Cell, depth: u8) -> Page {
-        let mut page = Page { cell, depth, last: 0, cut: [0; ROWS], drawn: [0; ROWS], stage: None, doubt: 0.0 };
+        let (rows, beside) = ([0; ROWS], [UNKNOWN; 4]);
+        let mut page = Page { cell, depth, last: 0, cut: rows, drawn: rows, stage: None, beside, doubt: 0.0 };
         page.cut[0] = 1;
         page
     }
@@ -119,6 +125,7 @@ impl Page {
         self.drawn[rows].fill(0);
         self.cut[0] = 1;
         (self.cell, self.depth, self.last, self.stage, self.doubt) = (cell, depth, 0, None, 0.0);
+        self.beside = [UNKNOWN; 4];
     }
 
     /// The deepest level there are cells of.

@@ -141,7 +141,10 @@ const NONE: Pair = [[u32::MAX; 2]; 2];
 const POINTS: usize = 6 * SIDE * SIDE + 16;
 const ENDS: usize = 2 * SIDE * SIDE + 2;
 
-/// What a walk over a page leaves behind.
+/// Points that are worth being raised together.
+const ENOUGH: usize = 4096;
+
+/// What walks over pages leave behind.
 #[derive(Clone, Debug)]
 pub(super) struct Trail {
     points: Vec<Point>,
@@ -158,15 +161,20 @@ pub(super) struct Trail {
 
 impl Default for Trail {
     fn default() -> Trail {
-        let (points, ends) = (vec![[0; 2]; POINTS], vec![0; ENDS]);
+        let (points, ends) = (vec![[0; 2]; ENOUGH + POINTS], vec![0; ENOUGH + ENDS]);
         Trail { points, length: 0, ends, strips: 0, slivers: Vec::new(), begun: 0, pen: NONE }
     }
 }
 
 impl Trail {
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         (self.length, self.strips, self.begun, self.pen) = (0, 0, 0, NONE);
         self.slivers.clear();
+    }
+
+    /// Whether this is enough to be raised: if not there is room for another page.
+    pub fn is_enough(&self) -> bool {
+        self.length >= ENOUGH || !self.slivers.is_empty()
     }
 
     /// The vertices of all strips, and where each ends.
@@ -365,7 +373,6 @@ fn is_wide() -> bool {
 impl Walk<'_> {
     /// Walks over the page.
     pub fn run(&mut self) {
-        self.trail.clear();
         #[cfg(target_arch = "x86_64")]
         if is_wide() {
             Wide::row(self, 0, 0, 0, 1);
@@ -478,13 +485,12 @@ impl Walk<'_> {
         // (e): the upper strip ends at the coarser cell's corner, unless it is there already; the lower goes on with its side.
         let [after, finer, over] = [row.after, row.finer, row.over].map(|bits| is(bits >> (to - 1)));
         let said = trail.length;
-        let last = &mut trail.points[said - 4..said];
-        let lower = after & !upper;
-        let upper = after & upper;
-        last[2][0] = last[2][0].wrapping_sub(width & upper);
-        last[0][0] = last[0][0].wrapping_sub(width & upper & finer);
-        last[3][1] = last[3][1].wrapping_sub(width & lower);
-        trail.pen = if upper != 0 { NONE } else { [[west, below], last[3]] };
+        let points = &mut trail.points[said - 4..said];
+        let (lower, upper) = (after & !upper, after & upper);
+        let last = [west, above.wrapping_sub(width & lower)];
+        points[0][0] = points[0][0].wrapping_sub(width & upper & finer);
+        points[2..].copy_from_slice(&[[west.wrapping_sub(width & upper), below], last]);
+        trail.pen = if upper != 0 { NONE } else { [[west, below], last] };
         trail.length -= (2 & upper & over) as usize;
         trail.end(upper != 0);
     }
