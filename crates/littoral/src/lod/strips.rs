@@ -19,7 +19,7 @@ use super::{Drawing, Limits, Lod, Reached, ScreenMetric, ViewError};
 use crate::field::HeightField;
 use crate::space::{Cell, Datum, View};
 use glam::DVec2;
-use page::{Asked, DEPTH, Page, SEAMS, UNKNOWN, halve};
+use page::{Asked, DEPTH, Page, SEAMS, SIDE, UNKNOWN, halve};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use stage::Rows;
@@ -70,6 +70,9 @@ struct Walked {
 
 /// Pages fewer than these are not worth other threads.
 const FEW: usize = 64;
+
+/// One page of so many is asked first where there may be too many triangles.
+const SOME: usize = 16;
 
 impl Tier {
     fn clear(&mut self, depth: u8) {
@@ -177,6 +180,16 @@ impl Strips {
                 (bound, page.count(), page.below())
             };
             let join = |a: (f32, usize, usize), b: (f32, usize, usize)| (a.0.max(b.0), a.1 + b.1, a.2 + b.2);
+            // What is far too much is known from a part of the pages.
+            if tier.used * SIDE * SIDE * 2 > self.limits.triangles && tier.used > SOME * FEW {
+                let mut rows = Rows::default();
+                let some = tier.pages[..tier.used].iter_mut().skip(SOME / 2).step_by(SOME);
+                let some = some.map(|page| refine(page, &mut rows)).reduce(join).unwrap_or_default();
+                let about = leaves + SOME * (some.1 + 3 * some.2);
+                if about > most / 8 * 10 {
+                    return Err(about);
+                }
+            }
             let (bound, drawn, pages) = tier.each(refine, join).unwrap_or_default();
             worst = tier.resolve(&asked, bound.max(worst));
             leaves += drawn;
@@ -202,34 +215,39 @@ impl Strips {
     /// Refines as far as the tolerance asks and the limits allow; the bound reached (pixels).
     fn fit(&mut self, field: &dyn HeightField, metric: &ScreenMetric) -> f32 {
         let most = self.limits.triangles.max(8);
-        let mut least = metric.tolerance();
-        let mut fits = least;
-        let (mut pixels, mut cells) = loop {
-            match self.refine(field, metric, fits) {
-                Ok(reached) => break reached,
+        // Most of what is allowed: a guess that is meant to fit should not just fail to.
+        let aim = most as f64 * 0.94;
+        // The finest bound that is known to be too fine and the coarsest one that fits, with the triangles they take.
+        let (mut fine, mut fits): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
+        let (mut guess, mut reached, mut stands) = (f64::from(metric.tolerance()), 0.0, true);
+        for tries in 0.. {
+            match self.refine(field, metric, guess as f32) {
+                Ok((pixels, cells)) => {
+                    fits = Some((guess, 2.0 * cells.max(1) as f64));
+                    (reached, stands) = (pixels, true);
+                }
                 Err(cells) => {
-                    // Triangles are about as many as the inverse of the bound.
-                    least = fits;
-                    fits *= (2.0 * cells as f32 / most as f32).powf(0.7).clamp(1.1, 10.0);
+                    fine = Some((guess, 2.0 * cells.max(1) as f64));
+                    stands = false;
                 }
             }
-        };
-        // Not much of what is allowed is left over.
-        let mut stands = true;
-        for _ in 0..4 {
-            if fits == least || 2 * cells >= most / 8 * 7 {
-                break;
-            }
-            let middle = (least * fits).sqrt();
-            match self.refine(field, metric, middle) {
-                Ok(reached) => ((pixels, cells), fits, stands) = (reached, middle, true),
-                Err(_) => (least, stands) = (middle, false),
-            }
+            // Between two bounds triangles are about a power of the bound; from one they are guessed to be as its inverse, or somewhat steeper.
+            guess = match (fine, fits) {
+                (None, _) => return reached,
+                (Some((bound, count)), None) => bound * (count / aim).powf(0.7).clamp(1.05, 10.0),
+                (Some(fine), Some(fits)) => {
+                    if fits.1 >= most as f64 * 0.875 || tries > 8 || fits.0 < fine.0 * 1.001 {
+                        break;
+                    }
+                    let share = (fine.1.max(aim * 1.01) / aim).ln() / (fine.1.max(aim * 1.01) / fits.1).ln();
+                    fine.0 * (fits.0 / fine.0).powf(share.clamp(0.1, 0.9))
+                }
+            };
         }
-        if !stands {
-            _ = self.refine(field, metric, fits);
+        if let (false, Some((bound, _))) = (stands, fits) {
+            _ = self.refine(field, metric, bound as f32);
         }
-        pixels
+        reached
     }
 
     /// Cuts more until neighbours differ by one level at most.
