@@ -32,6 +32,19 @@ struct CellBounds {
     bounds: Vec<f32>,
 }
 
+impl CellBounds {
+    /// Copies rows of so many bounds, from the first of `bounds` on.
+    fn copy<const COLUMNS: usize>(&self, bounds: &[f32], errors: &mut [f32]) -> bool {
+        for (errors, bounds) in errors.as_chunks_mut::<COLUMNS>().0.iter_mut().zip(bounds.chunks(self.columns)) {
+            if let Some((row, next)) = bounds.split_first_chunk() {
+                *errors = *row;
+                ask_for(next, COLUMNS);
+            }
+        }
+        true
+    }
+}
+
 /// Up to this many patches a side an edited cell is measured anew; larger ones only grow, unless a corner moved or there
 /// are voids.
 const REMEASURED_SIDE: usize = 64;
@@ -71,6 +84,29 @@ impl ErrorPyramid {
                 twist * f32::exp2(-2.0 * finer as f32)
             }
         }
+    }
+
+    /// The same for cells in rows of so many `columns`, `first` being the south-western one, each a square of several patches; `false` if they are smaller.
+    pub(super) fn rows(&self, first: Cell, columns: usize, errors: &mut [f32]) -> bool {
+        let Some(k) = self.finest.checked_sub(first.level).filter(|&k| k > 0) else { return false };
+        let level = &self.levels[usize::from(k) - 1];
+        let (column, row) = (first.x as usize, first.y as usize);
+        if column + columns <= level.columns && row + errors.len() / columns <= level.rows {
+            let bounds = &level.bounds[row * level.columns + column..];
+            // Rows of these lengths are copied without a call for each.
+            match columns {
+                2 => return level.copy::<2>(bounds, errors),
+                4 => return level.copy::<4>(bounds, errors),
+                8 => return level.copy::<8>(bounds, errors),
+                16 => return level.copy::<16>(bounds, errors),
+                32 => return level.copy::<32>(bounds, errors),
+                _ => (),
+            }
+        }
+        for (j, errors) in errors.chunks_mut(columns).enumerate() {
+            self.row(Cell { y: first.y + j as u32, ..first }, errors);
+        }
+        true
     }
 
     /// The same for cells in a row, `first` being the westernmost, each a square of several patches; `false` if they are smaller.

@@ -281,12 +281,12 @@ impl HeightField for Land {
 
     fn errors(&self, first: Cell, columns: usize, errors: &mut [f32]) {
         let pyramid = self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest));
+        if pyramid.rows(first, columns, errors) {
+            return;
+        }
         let patches = first.level == self.finest && !self.raster.voids().any();
         for (j, errors) in errors.chunks_mut(columns).enumerate() {
             let first = Cell { y: first.y + j as u32, ..first };
-            if pyramid.row(first, errors) {
-                continue;
-            }
             if patches {
                 self.patch_errors(first.x as usize, first.y as usize, errors);
                 continue;

@@ -41,7 +41,7 @@ pub(super) struct Samples<'a> {
 
 /// How many times eight points ahead of what is read memory is asked for.
 #[cfg(target_arch = "x86_64")]
-const AHEAD: usize = 16;
+const AHEAD: usize = 32;
 
 impl Samples<'_> {
     /// Adds vertices at points that lie on samples; `false`, and nothing added, if some do not.
@@ -96,10 +96,10 @@ impl Samples<'_> {
         let faces = _mm512_set1_epi64(face.into());
         let first = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11);
         let last = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
-        // Reading waits for memory most of the time: what comes later is asked for ahead of it. Points of strips alternate between a row and the next, and
-        // every other one was read with the row before.
+        // Reading waits for memory most of the time: what comes later is asked for ahead of it. Points of strips alternate between a row and the next: every
+        // other one was read with the row before, and lines of memory hold several.
         let ahead_of = |points: &[[u32; 2]; 8]| {
-            for &[x, y] in points.iter().step_by(2) {
+            for &[x, y] in points.iter().step_by(4) {
                 let at = (y >> self.shift) as usize * self.columns + (x >> self.shift) as usize;
                 // Where there is no memory nothing is asked for.
                 _mm_prefetch::<_MM_HINT_T0>(self.heights.as_ptr().wrapping_add(at).cast());

@@ -474,7 +474,7 @@ impl Walked {
             };
             Beyond { page, cell }
         });
-        self.way.load(page, beyond, turned);
+        self.way.load(page, &beyond, turned);
         let side = STEPS >> level;
         let corner = [x, y].map(|at| (at + u32::from(turned)) * side);
         let side = if turned { side.wrapping_neg() } else { side };

@@ -29,6 +29,7 @@ pub(super) fn row(level: u8, y: u32) -> usize {
 }
 
 /// A square of the quadtree that is cut, and what becomes of its parts.
+#[repr(C)]
 #[derive(Clone, Debug)]
 pub(super) struct Page {
     /// The square.
@@ -37,14 +38,14 @@ pub(super) struct Page {
     pub depth: u8,
     /// The last level of which anything is cut.
     pub last: u8,
+    /// Pages beside it to the south, east, north and west, once they were looked for.
+    pub beside: [u32; 4],
     /// What is cut; those of the last level are pages of their own.
     pub cut: [u64; ROWS],
     /// What is drawn: while the page is measured, what is whole and may be seen.
     pub drawn: [u64; ROWS],
     /// How it lies before the eye, once it was asked for.
     stage: Option<Stage>,
-    /// Pages beside it to the south, east, north and west, once they were looked for.
-    pub beside: [u32; 4],
     /// What the bounds (pixels) of its cells that cannot be cut do not exceed, if they were not asked for.
     pub doubt: f32,
 }

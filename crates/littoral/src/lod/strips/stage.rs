@@ -144,16 +144,26 @@ impl Stage {
                 asked.field.row(first, &mut ranges[part.clone()], &mut errors[part.clone()]);
             }
         }
+        // Three in a row, then three of these in a column.
+        let both = |a: HeightRange, b: HeightRange| HeightRange {
+            low: if a.low < b.low { a.low } else { b.low },
+            high: if a.high > b.high { a.high } else { b.high },
+        };
+        let mut threes = [[HeightRange::EMPTY; ACROSS]; ACROSS + 2];
+        for (threes, ranges) in threes.iter_mut().zip(&ranges) {
+            for (x, three) in threes.iter_mut().enumerate() {
+                *three = both(both(ranges[x], ranges[x + 1]), ranges[x + 2]);
+            }
+        }
         let mut slabs = [[HeightRange::EMPTY; ACROSS]; ACROSS];
         let mut slab = HeightRange::EMPTY;
         let eye = asked.metric.eye().z;
         let blur = eye.abs() as f32 * f32::EPSILON;
         for (y, slabs) in slabs[..across].iter_mut().enumerate() {
             for (x, here) in slabs[..across].iter_mut().enumerate() {
-                let rows = ranges[y..y + 3].iter().flat_map(|row| &row[x..x + 3]);
-                let range = rows.fold(HeightRange::EMPTY, |all, range| all.union(*range));
+                let range = both(both(threes[y][x], threes[y + 1][x]), threes[y + 2][x]);
                 *here = HeightRange { low: range.low - eye as f32 - blur, high: range.high - eye as f32 + blur };
-                slab = slab.union(*here);
+                slab = both(slab, *here);
             }
         }
         // The farthest corner, and a cell beyond.

@@ -43,6 +43,7 @@ pub(super) struct Beyond<'a> {
 
 impl Beyond<'_> {
     /// What is drawn in a column of a level, a bit for each row.
+    #[inline(always)]
     fn column(&self, level: u8, x: u32) -> u64 {
         match self.page {
             Some(page) if level <= page.deepest() => column(&page.drawn[row(level, 0)..][..1 << level], x),
@@ -61,7 +62,7 @@ impl Beyond<'_> {
 }
 
 /// A column of bits as a row.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+#[inline(always)]
 fn column(rows: &[u64], x: u32) -> u64 {
     let mut bits = 0;
     for (y, row) in rows.iter().enumerate() {
@@ -75,6 +76,41 @@ fn index(level: u8, y: i64) -> usize {
     ((1i64 << level) + i64::from(level) + y) as usize
 }
 
+/// [`Way::load`].
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn load(way: &mut Way, page: &Page, beyond: &[Beyond; 4], turned: bool) {
+    way.depth = page.depth;
+    let [south, east, north, west] = beyond;
+    for level in 0..=page.deepest() {
+        let side = 1usize << level;
+        let (at, above) = (index(level, 0), index(level, -1));
+        let rows = row(level, 0)..row(level, 0) + side;
+        let both = page.cut[rows.clone()].iter().zip(&page.drawn[rows]);
+        let ways = way.cut[at..at + side].iter_mut().zip(&mut way.drawn[at..at + side]);
+        let columns = [east.column(level, 0), west.column(level, side as u32 - 1)];
+        let slot = usize::from(level);
+        if turned {
+            for (to, from) in ways.zip(both.rev()) {
+                (*to.0, *to.1) = (turn(*from.0, side), turn(*from.1, side));
+            }
+            [way.before[slot], way.after[slot]] = columns.map(|bits| turn(bits, side));
+            [way.cut[above], way.drawn[above]] = north.row(level, 0).map(|bits| turn(bits, side));
+        } else {
+            for (to, from) in ways.zip(both) {
+                (*to.0, *to.1) = (*from.0, *from.1);
+            }
+            [way.after[slot], way.before[slot]] = columns;
+            [way.cut[above], way.drawn[above]] = south.row(level, side as u32 - 1);
+        }
+    }
+}
+
+/// The bits of a row from its other end.
+#[inline(always)]
+fn turn(bits: u64, side: usize) -> u64 {
+    bits.reverse_bits() >> (64 - side)
+}
+
 impl Default for Way {
     fn default() -> Way {
         let beside = [0; DEPTH as usize + 1];
@@ -84,31 +120,8 @@ impl Default for Way {
 
 impl Way {
     /// A page between its neighbours to the south, east, north and west, to be walked north- and eastward, or, if `turned`, south- and westward.
-    pub fn load(&mut self, page: &Page, beyond: [Beyond; 4], turned: bool) {
-        self.depth = page.depth;
-        let [south, east, north, west] = beyond;
-        for level in 0..=page.deepest() {
-            let side = 1usize << level;
-            let (at, above) = (index(level, 0), index(level, -1));
-            let rows = row(level, 0)..row(level, 0) + side;
-            let (cut, drawn) = (&mut self.cut[at..at + side], &mut self.drawn[at..at + side]);
-            cut.copy_from_slice(&page.cut[rows.clone()]);
-            drawn.copy_from_slice(&page.drawn[rows]);
-            let columns = [east.column(level, 0), west.column(level, side as u32 - 1)];
-            let slot = usize::from(level);
-            if turned {
-                let turn = |bits: u64| bits.reverse_bits() >> (64 - side);
-                for rows in [cut, drawn] {
-                    rows.reverse();
-                    rows.iter_mut().for_each(|bits| *bits = turn(*bits));
-                }
-                [self.before[slot], self.after[slot]] = columns.map(turn);
-                [self.cut[above], self.drawn[above]] = north.row(level, 0).map(turn);
-            } else {
-                [self.after[slot], self.before[slot]] = columns;
-                [self.cut[above], self.drawn[above]] = south.row(level, side as u32 - 1);
-            }
-        }
+    pub fn load(&mut self, page: &Page, beyond: &[Beyond; 4], turned: bool) {
+        load(self, page, beyond, turned);
     }
 
     fn cut(&self, level: u8, y: i64) -> u64 {
@@ -337,25 +350,27 @@ fn wide_row(walk: &mut Walk, level: u8, y: u32, from: u32, to: u32) {
 fn wide_write(points: &mut [Point], run: &Run) {
     use std::arch::x86_64::*;
     let &Run { cells, west, width, above, below, finer, over } = run;
-    let [w, half, west, a, b] = [width as i32, width as i32 / 2, west as i32, above as i32, below as i32];
-    let w2 = w.wrapping_mul(2);
-    let west = _mm512_mask_set1_epi32(_mm512_setzero_si512(), 0x5555, west);
-    let between = w.wrapping_add(half);
-    let two = _mm512_setr_epi32(w, b, half, a, w, b, w, a, w2, b, between, a, w2, b, w2, a);
-    let (mut two, width) = (_mm512_add_epi32(west, two), _mm512_set1_epi32(w));
-    let step = _mm512_mask_set1_epi32(_mm512_setzero_si512(), 0x5555, w2);
+    let (w, half, two) = (width as i32, width as i32 / 2, (width as i32).wrapping_mul(2));
+    // Two pairs for each of two cells: sides and halves of sides that their points are ahead, and which are above and below.
+    let sides = _mm512_setr_epi32(1, 0, 0, 0, 1, 0, 1, 0, 2, 0, 1, 0, 2, 0, 2, 0);
+    let halves = _mm512_setr_epi32(0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0);
+    let ahead = _mm512_mullo_epi32(_mm512_set1_epi32(w), sides);
+    let ahead = _mm512_add_epi32(ahead, _mm512_mullo_epi32(_mm512_set1_epi32(half), halves));
+    let pairs = _mm512_mask_set1_epi32(_mm512_set1_epi32(west as i32), 0x2222, below as i32);
+    let mut pairs = _mm512_add_epi32(_mm512_mask_set1_epi32(pairs, 0x8888, above as i32), ahead);
+    let (width, step) = (_mm512_set1_epi32(w), _mm512_maskz_set1_epi32(0x5555, two));
     // Mostly there are four cells or fewer: so many are written whether they are there or not.
     let (mut length, mut x) = (0, 0);
     while x < 4 || x < cells {
         let (finer, over) = (finer >> x & 3, over >> x & 3);
         // Both pairs of a cell below finer ones, the second of others; ahead by two cells below a coarser one.
         let said = 0xcc | 3 * _pdep_u64(finer, 0x11) as u8;
-        let ahead = _mm512_mask_add_epi32(two, _pdep_u64(over, 0x4040) as u16, two, width);
+        let ahead = _mm512_mask_add_epi32(pairs, _pdep_u64(over, 0x4040) as u16, pairs, width);
         let Some(points) = points[length..].first_chunk_mut::<8>() else { return };
         // SAFETY: as above.
         unsafe { _mm512_storeu_si512(points.as_mut_ptr().cast(), _mm512_maskz_compress_epi64(said, ahead)) };
         length += 4 + 2 * finer.count_ones() as usize;
-        two = _mm512_add_epi32(two, step);
+        pairs = _mm512_add_epi32(pairs, step);
         x += 2;
     }
 }
