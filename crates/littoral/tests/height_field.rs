@@ -49,13 +49,18 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
             assert_eq!(field.stencil_error(cell, depth), most, "{cell:?}: {depth} levels below");
         }
         let count = (side - cell.x).min(5) as usize;
-        let (mut ranges, mut errors, mut alone) = ([HeightRange::EMPTY; 5], [f32::NAN; 5], [f32::NAN; 5]);
+        let (mut ranges, mut errors) = ([HeightRange::EMPTY; 5], [f32::NAN; 5]);
         field.row(cell, &mut ranges[..count], &mut errors[..count]);
-        field.errors(cell, &mut alone[..count]);
         for i in 0..count {
             let cell = Cell { x: cell.x + i as u32, ..cell };
             assert_eq!((ranges[i], errors[i]), (field.range(cell), field.error(cell)), "{cell:?} in a row");
-            assert_eq!(alone[i], errors[i], "{cell:?} in a row of errors");
+        }
+        let columns = [1, 2, 3, 4, 5, 8, 16, 32][random.below(8) as usize].min((side - cell.x) as usize);
+        let mut errors = vec![f32::NAN; columns * (side - cell.y).min(3) as usize];
+        field.errors(cell, columns, &mut errors);
+        for (i, error) in errors.into_iter().enumerate() {
+            let cell = Cell { x: cell.x + (i % columns) as u32, y: cell.y + (i / columns) as u32, ..cell };
+            assert_eq!(error, field.error(cell), "{cell:?} among rows of errors");
         }
         let at = |u: f64, v: f64| Place { face: 0, uv: cell.low_corner().uv + DVec2::new(u, v) * cell.side() };
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|(u, v)| field.height(at(u, v)));

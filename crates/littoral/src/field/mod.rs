@@ -149,7 +149,8 @@ pub trait HeightField: Sync {
                 place.uv = DVec2::new(f64::from(x), f64::from(y)) * step;
             }
             self.heights(places, heights);
-            let raised = points.iter().zip(heights).map(|(&[x, y], height)| Vertex { x, y, face: face.into(), height: *height });
+            let raised =
+                points.iter().zip(heights).map(|(&[x, y], height)| Vertex { x, y, face: face.into(), height: *height });
             vertices.extend(raised);
         }
     }

@@ -1,7 +1,7 @@
 //! What methods put out: patches of one stencil, or a mesh of their own.
 
-pub use crate::field::Vertex;
 use crate::field::HeightField;
+pub use crate::field::Vertex;
 use crate::space::{Cell, Datum, Place};
 use glam::{DVec2, Vec3};
 

@@ -371,7 +371,8 @@ impl Judge {
     }
 
     fn judged(&self) -> Judged {
-        let pixels = |square: f32| if square > 0.0 { (square * self.scale).sqrt() * (1.0 + 1e-5) + self.apart } else { 0.0 };
+        let pixels =
+            |square: f32| if square > 0.0 { (square * self.scale).sqrt() * (1.0 + 1e-5) + self.apart } else { 0.0 };
         Judged { worst: pixels(self.worst), most: pixels(self.most) }
     }
 }
@@ -439,7 +440,8 @@ mod wide {
             let (x_ahead, x_far) = reach(lens, 0, columns, slack);
             let x_ahead = _mm512_sub_ps(x_ahead, _mm512_set1_ps(slack));
             let mut above = 0u64;
-            for (part, errors) in rows.errors.as_chunks::<LANES>().0[..(side * side).div_ceil(LANES)].iter().enumerate() {
+            for (part, errors) in rows.errors.as_chunks::<LANES>().0[..(side * side).div_ceil(LANES)].iter().enumerate()
+            {
                 let at = part * LANES;
                 let y = _mm512_add_epi32(lanes, _mm512_set1_epi32(at as i32));
                 let y = _mm512_srl_epi32(y, _mm_cvtsi64_si128(level.into()));
@@ -463,15 +465,20 @@ mod wide {
             let (ahead, far) = reach(lens, 0, x, slack);
             *columns = (_mm512_sub_ps(ahead, _mm512_set1_ps(slack)), far, _mm512_srl_epi32(x, block));
         }
+        let (mut sixteen_ahead, mut sixteen_far) = (_mm512_setzero_ps(), _mm512_setzero_ps());
         for y in 0..side {
+            if y % LANES == 0 {
+                let y = _mm512_add_epi32(lanes, _mm512_set1_epi32(y as i32));
+                (sixteen_ahead, sixteen_far) = reach(lens, 1, y, slack);
+            }
             let asked = rows.cells[y] & rows.whole[y] & rows.seen[y];
             rows.above[y] = 0;
             if asked == 0 {
                 continue;
             }
-            let [south, north] = lens.rows(y as i32);
-            let y_ahead = _mm512_set1_ps(lesser(lens.forward[1], south, north));
-            let y_far = _mm512_set1_ps(square(farther(south, north) + slack));
+            let lane = _mm512_set1_epi32((y % LANES) as i32);
+            let y_ahead = _mm512_permutexvar_ps(lane, sixteen_ahead);
+            let y_far = _mm512_permutexvar_ps(lane, sixteen_far);
             let blocks = _mm512_set1_epi32(((y >> (level - BLOCKS)) << BLOCKS) as i32);
             let mut above = 0;
             for (part, &(ahead, far, block)) in columns[..side / LANES].iter().enumerate() {
@@ -534,7 +541,8 @@ pub(super) fn look_near(asked: &Asked, lens: &Lens, first: Cell, judges: bool, r
             if !judges || rows.whole[y] >> x & 1 == 0 {
                 continue;
             }
-            let bound = seams * asked.metric.pixels(&bounds, rows.errors[rows.index(x as usize, y)]) * (1.0 + 1e-5) + apart;
+            let bound =
+                seams * asked.metric.pixels(&bounds, rows.errors[rows.index(x as usize, y)]) * (1.0 + 1e-5) + apart;
             if lens.cuts && bound > lens.tolerance {
                 rows.above[y] |= 1 << x;
                 judged.most = judged.most.max(bound);
@@ -590,5 +598,60 @@ pub(super) fn see(lens: &Lens, stage: &Stage, rows: &mut Rows) {
                 rows.seen[y] &= seen;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::{Land, Raster};
+    use crate::lod::ScreenMetric;
+    use glam::{DVec3, UVec2};
+
+    /// Sixteen cells at once are judged as single ones are.
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn cells_are_judged_alike_by_all_processors() {
+        if !std::arch::is_x86_feature_detected!("avx512f") {
+            println!("this processor has no AVX-512: not tested");
+            return;
+        }
+        let bumps = (0..129 * 129).map(|i| ((i * 7919) % 101) as f32 * 0.1).collect();
+        let land = Land::new(Raster::new(129, 129, DVec2::new(3.0, 5.0), bumps).expect("valid"));
+        let (mut state, mut above) = (7u64, 0);
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state ^ state >> 29
+        };
+        for (eye, tolerance) in [((-40.0, 60.0, 130.0), 9.0), ((-900.0, 90.0, 20.0), 4.0), ((0.0, 0.0, 400.0), 0.5)] {
+            let view = View::looking_at(DVec3::from(eye), DVec3::Z, 0.8, UVec2::new(320, 200));
+            let metric = ScreenMetric::new(&view, crate::field::HeightField::datum(&land)).expect("a view");
+            let page = Cell { level: 1, x: 1, y: 0, face: 0 };
+            let asked = Asked::new(&land, &metric, tolerance, 9);
+            let stage = Stage::new(&asked, page, 6);
+            for (level, cuts) in (1..=6).flat_map(|level| [(level, true), (level, false)]) {
+                let lens = Lens::new(&asked, Cell { level: 1 + level, x: 1 << level, y: 0, face: 0 }, level, cuts);
+                let rows = |random: &mut dyn FnMut() -> u64| {
+                    let mut rows = Rows::default();
+                    rows.room(level);
+                    let side = 1usize << level;
+                    let all = u64::MAX >> (64 - side);
+                    rows.cells[..side].fill_with(|| random() & all);
+                    rows.whole[..side].fill_with(|| random() | random());
+                    rows.seen[..side].fill_with(|| random() | random());
+                    rows.errors.fill_with(|| (random() >> 40) as f32 * 3e-7);
+                    rows
+                };
+                let mut rows = rows(&mut random);
+                let one = judge_rows(&lens, &stage, &mut rows);
+                let said = rows.above;
+                // SAFETY: the processor has just been asked.
+                let other = unsafe { wide::judge(&lens, &stage, &mut rows) };
+                assert_eq!(said, rows.above, "level {level}");
+                assert_eq!((one.worst, one.most), (other.worst, other.most), "level {level}");
+                above += said.iter().map(|bits| bits.count_ones()).sum::<u32>();
+            }
+        }
+        assert!((1000..10_000).contains(&above), "{above} above");
     }
 }

@@ -390,10 +390,13 @@ impl Walk<'_> {
     pub fn run(&mut self) {
         #[cfg(target_arch = "x86_64")]
         if is_wide() {
-            Wide::row(self, 0, 0, 0, 1);
-            return self.trail.lift();
+            return self.with::<Wide>();
         }
-        Plain::row(self, 0, 0, 0, 1);
+        self.with::<Plain>();
+    }
+
+    fn with<H: Hand>(&mut self) {
+        H::row(self, 0, 0, 0, 1);
         self.trail.lift();
     }
 
@@ -483,10 +486,8 @@ impl Walk<'_> {
         // After a coarser cell the upper strip begins with all of its side, the lower at its corner.
         let is = |bit: u64| (bit as u32 & 1).wrapping_neg();
         let [upper, before] = [is(upper.into()), is(row.before >> from)];
-        let first = [
-            [west, below.wrapping_add(width & before & upper)],
-            [west, above.wrapping_add(width & before & !upper)],
-        ];
+        let first =
+            [[west, below.wrapping_add(width & before & upper)], [west, above.wrapping_add(width & before & !upper)]];
         trail.go_on(first);
         // (b): above finer cells the upper vertex advances by halves; (c): below a coarser one by both cells at once; else (a).
         let cells = to - from;
@@ -508,5 +509,62 @@ impl Walk<'_> {
         trail.pen = if upper != 0 { NONE } else { [[west, below], last] };
         trail.length -= (2 & upper & over) as usize;
         trail.end(upper != 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::space::Cell;
+
+    /// Several cells at once come out as single ones do.
+    #[test]
+    #[cfg(target_arch = "x86_64")]
+    fn strips_are_alike_on_all_processors() {
+        if !is_wide() {
+            println!("this processor has no AVX-512: not tested");
+            return;
+        }
+        let mut state = 3u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state ^ state >> 29
+        };
+        let (mut strips, mut slivers) = (0, 0);
+        for round in 0..60 {
+            // What is cut need not be balanced, nor drawn be whole.
+            let level = if round % 3 == 0 { 24 } else { 5 };
+            let mut page = Page::of(Cell { level, x: 2, y: 1, face: 0 }, DEPTH);
+            for level in 1..=DEPTH {
+                for y in 0..1u32 << level {
+                    let cells = double(page.cut[row(level - 1, y >> 1)]);
+                    let cut = if level < DEPTH { cells & (random() | random()) } else { 0 };
+                    page.mark(level, y, cut);
+                    page.drawn[row(level, y)] =
+                        cells & !cut & if round % 2 == 0 { u64::MAX } else { random() | random() };
+                }
+            }
+            let beyond =
+                [(); 4].map(|()| Beyond { page: (random() & 1 == 0).then_some(&page), cell: random() & 1 == 0 });
+            let turned = round % 4 > 1;
+            let mut way = Way::default();
+            way.load(&page, &beyond, turned);
+            let walked = |wide: bool| {
+                let mut trail = Trail::default();
+                let side = (super::super::super::drawing::STEPS >> level) as i32 * if turned { -1 } else { 1 };
+                let mut walk = Walk { way: &way, trail: &mut trail, corner: [1 << 29, 1 << 28], side: side as u32 };
+                if wide {
+                    walk.with::<Wide>()
+                } else {
+                    walk.with::<Plain>()
+                }
+                let (points, ends) = trail.strips();
+                (points.to_vec(), ends.to_vec(), trail.slivers().to_vec())
+            };
+            let wide = walked(true);
+            assert!(wide == walked(false), "round {round}");
+            (strips, slivers) = (strips + wide.1.len(), slivers + wide.2.len());
+        }
+        assert!(strips > 10_000 && slivers > 1000, "{strips} strips, {slivers} upright triangles");
     }
 }
