@@ -9,7 +9,7 @@ use clock::median;
 use glam::DVec2;
 use littoral::waves::{
     BLOCK, Beach, Grid, GridScratch, Length, Motion, Path, Peachey, PlaneWave, Points, SeaState, Sine, Sines,
-    StillWater, Superposition, Surf, Swell, WaveModel, components,
+    StillWater, Superposition, Surf, Swell, Velocity, WaveModel, components,
 };
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -57,8 +57,41 @@ fn main() {
         println!("Peachey's phases over 400 × 600 nodes, {path:?}: {:.0} ms a train", made * 1e3);
     }
     let waves = Peachey::new(&bed, &[swell], Path::Refracted, Surf::default()).expect("waves");
-    let asked = rate(|| motions(&waves, &near));
-    println!("Peachey's waves, one train, with slopes: {asked:.1} million points a second");
+    let off: Vec<DVec2> = near.iter().map(|p| DVec2::new(700.0, -1500.0) + p).collect();
+    let all: Vec<DVec2> = scattered.iter().map(|p| DVec2::new(p.x % 1995.0, -p.y % 2900.0)).collect();
+    println!("Peachey's waves, one train, million points a second:");
+    for (name, places) in [("near each other", &off), ("all over the bed", &all)] {
+        let heights = rate(|| displacements(&waves, places));
+        let slopes = rate(|| motions(&waves, places));
+        let speeds = rate(|| velocities(&waves, places));
+        println!("{name}: heights {heights:.1}; with slopes {slopes:.1}; velocities {speeds:.1}");
+    }
+}
+
+/// Displacements of all places, block by block.
+fn displacements(model: &dyn WaveModel, places: &[DVec2]) {
+    for places in places.chunks_exact(BLOCK) {
+        let mut motion = Motion::STILL;
+        model.add_displacement(&block(places), &mut motion);
+        black_box(&motion);
+    }
+}
+
+/// Velocities half a metre below all places.
+fn velocities(model: &dyn WaveModel, places: &[DVec2]) {
+    for places in places.chunks_exact(BLOCK) {
+        let mut velocity = Velocity::STILL;
+        model.add_velocity(&block(places), &[0.5; BLOCK], &mut velocity);
+        black_box(&velocity);
+    }
+}
+
+fn block(places: &[DVec2]) -> Points {
+    let mut points = Points::at(0.0, 0.0);
+    for (lane, place) in places.iter().enumerate() {
+        (points.x[lane], points.y[lane]) = (place.x, place.y);
+    }
+    points
 }
 
 /// Motions of all places, some blocks at a time.
@@ -67,9 +100,7 @@ fn motions(model: &dyn WaveModel, places: &[DVec2]) {
     let (mut points, mut motions) = ([Points::at(0.0, 0.0); BLOCKS], [Motion::STILL; BLOCKS]);
     for places in places.chunks_exact(BLOCK * BLOCKS) {
         for (points, places) in points.iter_mut().zip(places.chunks_exact(BLOCK)) {
-            for (lane, place) in places.iter().enumerate() {
-                (points.x[lane], points.y[lane]) = (place.x, place.y);
-            }
+            *points = block(places);
         }
         motions.fill(Motion::STILL);
         model.add_motions(&points, &mut motions);

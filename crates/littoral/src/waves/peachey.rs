@@ -11,9 +11,6 @@
 //! Between the nodes of the bed everything is a quadratic B-spline, which smooths a little and never leaves the range of its nodes: so bounds
 //! hold. Beyond the bed its border's depths go on straight outward.
 
-#![allow(clippy::needless_range_loop, reason = "lanes of several arrays are told apart by their number")]
-
-use super::sum::circle;
 use super::{BLOCK, Bounds, Motion, OutOfRange, Points, STANDARD_GRAVITY, StillWater, Velocity, WaveModel};
 use glam::DVec2;
 use libm::{sqrt, tanh};
@@ -21,6 +18,7 @@ use std::f64::consts::{PI, TAU};
 
 mod beach;
 mod eikonal;
+mod kernel;
 #[cfg(test)]
 mod tests;
 
@@ -99,6 +97,7 @@ struct Train {
     swell: Swell,
     /// Cycles per metre in the deep.
     far: DVec2,
+    /// Those of the bed, row by row northward, framed with copies of those at its border.
     nodes: Vec<Node>,
     /// Greatest heights (m) of waves shorter than [`threshold`].
     rough: [f32; THRESHOLDS],
@@ -128,18 +127,6 @@ fn threshold(index: usize) -> f64 {
     1e-3 * libm::exp2(index as f64 / 4.0)
 }
 
-/// A number and its derivatives eastward and northward.
-type Jet = [f64; 3];
-
-/// A train at a point.
-struct Here {
-    cycles: Jet,
-    amplitude: Jet,
-    shore: Jet,
-    wavenumber: Jet,
-    depth: f64,
-}
-
 /// Wave number (rad/m) of waves of the deep wave number k∞ (rad/m) over a depth (m): solves k tanh(k h) = k∞ to 1e-12.
 pub(crate) fn wavenumber(deep: f64, depth: f64) -> f64 {
     let wanted = deep * depth;
@@ -157,24 +144,6 @@ pub(crate) fn wavenumber(deep: f64, depth: f64) -> f64 {
 /// Peachey's approximation k∞ / √tanh(k∞ h) of the same (rad/m): too small by at most 4.98 %, where k∞ h = 0.694.
 pub(crate) fn rough_wavenumber(deep: f64, depth: f64) -> f64 {
     deep / sqrt(tanh(deep * depth))
-}
-
-/// Peachey's profile and its derivatives by phase and by shore, at a phase in cycles: a cosine in the deep, 8 (u − ½)² − 1 at the shore.
-fn profile(cycles: f64, shore: f32) -> (f32, f32, f32) {
-    let u = (cycles - cycles.floor()) as f32;
-    let (cosine, sine) = circle(u);
-    let beside = u - 0.5;
-    let parabola = 8.0 * beside * beside - 1.0;
-    let w = cosine + shore * (parabola - cosine);
-    let by_cycles = -std::f32::consts::TAU * sine;
-    (w, by_cycles + shore * (16.0 * beside - by_cycles), parabola - cosine)
-}
-
-/// Mean of the square of the profile's derivative by phase.
-fn profile_steepness(shore: f32) -> f32 {
-    let deep = 1.0 - shore;
-    let square = std::f32::consts::PI * std::f32::consts::PI;
-    deep * deep * 2.0 * square + 2.0 * deep * shore * 16.0 + shore * shore * (64.0 / 3.0)
 }
 
 impl Peachey {
@@ -202,7 +171,10 @@ impl Peachey {
                 trains.iter_mut().for_each(|train| train.nodes[node].amplitude *= (most / total) as f32);
             }
         }
-        trains.iter_mut().for_each(Train::measure_roughness);
+        for train in &mut trains {
+            train.measure_roughness();
+            train.frame(bed.columns, bed.rows);
+        }
         let (columns, rows, spacing) = (bed.columns, bed.rows, bed.spacing);
         let mut waves =
             Peachey { origin: bed.origin, spacing, columns, rows, trains, bounds: Bounds::default(), time: 0.0 };
@@ -214,36 +186,6 @@ impl Peachey {
     /// Its trains as they were set.
     pub fn swells(&self) -> impl Iterator<Item = &Swell> {
         self.trains.iter().map(|train| &train.swell)
-    }
-
-    /// Every train at a place.
-    fn at(&self, train: &Train, x: f64, y: f64) -> Here {
-        let fine = |number: f64| if number.abs() <= 1e12 { number } else { 0.0 };
-        let beyond = DVec2::new(fine(x), fine(y)) - self.origin;
-        let (columns, across, across_by) = taps(beyond.x / self.spacing, self.columns);
-        let (rows, up, up_by) = taps(beyond.y / self.spacing, self.rows);
-        let mut sums = [[0.0; 3]; 5];
-        for j in 0..3 {
-            for i in 0..3 {
-                let node = &train.nodes[rows[j] * self.columns + columns[i]];
-                let weights = [across[i] * up[j], across_by[i] * up[j], across[i] * up_by[j]];
-                let numbers = [node.amplitude, node.shore, node.wavenumber, node.depth].map(f64::from);
-                let numbers = [node.cycles, numbers[0], numbers[1], numbers[2], numbers[3]];
-                for (sum, number) in sums.iter_mut().zip(numbers) {
-                    for (sum, weight) in sum.iter_mut().zip(weights) {
-                        *sum += number * weight;
-                    }
-                }
-            }
-        }
-        for [_, by_x, by_y] in &mut sums {
-            (*by_x, *by_y) = (*by_x / self.spacing, *by_y / self.spacing);
-        }
-        let [mut cycles, amplitude, shore, wavenumber, depth] = sums;
-        cycles[0] += train.cycles + train.far.dot(beyond);
-        cycles[1] += train.far.x;
-        cycles[2] += train.far.y;
-        Here { cycles, amplitude, shore, wavenumber, depth: depth[0] }
     }
 
     fn measure_bounds(&self) -> Bounds {
@@ -269,9 +211,7 @@ impl Peachey {
 
     /// Height and slope of a train around a node.
     fn bounds_near(&self, train: &Train, column: usize, row: usize) -> (f64, f64) {
-        let around = |at: usize, count: usize| [at.saturating_sub(1), at, (at + 1).min(count - 1)];
-        let (columns, rows) = (around(column, self.columns), around(row, self.rows));
-        let node = |i: usize, j: usize| &train.nodes[rows[j] * self.columns + columns[i]];
+        let node = |i: usize, j: usize| &train.nodes[(row + j) * (self.columns + 2) + column + i];
         let most = (0..9).map(|n| f64::from(node(n % 3, n / 3).amplitude)).fold(0.0, f64::max);
         // Largest differences eastward and northward of phase, amplitude and shore.
         let (mut x, mut y) = ([train.far.x.abs(), 0.0, 0.0], [train.far.y.abs(), 0.0, 0.0]);
@@ -296,16 +236,15 @@ impl Peachey {
         for train in &self.trains {
             let (mut high, mut phase, mut rise) = (0f64, 0f64, 0f64);
             let (mut bend, mut rise_bend) = (0f64, 0f64);
-            let at = |column: usize, row: usize| &train.nodes[row * self.columns + column];
+            let at = |i: usize, j: usize| &train.nodes[j * (self.columns + 2) + i];
             let (h, far) = (self.spacing, train.far.length());
-            for row in 0..self.rows {
-                for column in 0..self.columns {
+            for row in 1..=self.rows {
+                for column in 1..=self.columns {
                     let here = at(column, row);
                     high = high.max(f64::from(here.amplitude));
-                    for (before, after) in [
-                        (at(column.saturating_sub(1), row), at((column + 1).min(self.columns - 1), row)),
-                        (at(column, row.saturating_sub(1)), at(column, (row + 1).min(self.rows - 1))),
-                    ] {
+                    for (before, after) in
+                        [(at(column - 1, row), at(column + 1, row)), (at(column, row - 1), at(column, row + 1))]
+                    {
                         let change = |from: f64, to: f64| (to - from).abs() / h;
                         phase = phase.max(far + 1.5 * change(here.cycles, after.cycles));
                         rise = rise.max(1.5 * change(f64::from(here.amplitude), f64::from(after.amplitude)));
@@ -320,21 +259,6 @@ impl Peachey {
         }
         (most * (1.0 + 1e-5)) as f32
     }
-}
-
-/// The nodes around a place (in spacings), their weights, and these weights' derivatives.
-fn taps(place: f64, count: usize) -> ([usize; 3], [f64; 3], [f64; 3]) {
-    // One beyond the border the spline is constant outward.
-    let place = place.clamp(-1.0, count as f64);
-    let nearest = place.round();
-    let t = place - nearest;
-    let index = |offset: f64| (nearest + offset).clamp(0.0, count as f64 - 1.0) as usize;
-    let (before, after) = (0.5 - t, 0.5 + t);
-    (
-        [index(-1.0), index(0.0), index(1.0)],
-        [0.5 * before * before, 0.75 - t * t, 0.5 * after * after],
-        [-before, -2.0 * t, after],
-    )
 }
 
 impl Depths {
@@ -415,6 +339,18 @@ impl Train {
         Ok(Train { swell: *swell, far, nodes, rough: [0.0; THRESHOLDS], cycles: 0.0 })
     }
 
+    /// Frames its nodes with copies of those at the border.
+    fn frame(&mut self, columns: usize, rows: usize) {
+        let mut framed = Vec::with_capacity((columns + 2) * (rows + 2));
+        for row in [0].into_iter().chain(0..rows).chain([rows - 1]) {
+            let row = &self.nodes[row * columns..][..columns];
+            framed.push(row[0]);
+            framed.extend_from_slice(row);
+            framed.push(row[columns - 1]);
+        }
+        self.nodes = framed;
+    }
+
     fn measure_roughness(&mut self) {
         // Greatest heights, and those of creases, of waves up to each threshold and longer than the one before.
         let mut own = [[0f64; 2]; THRESHOLDS];
@@ -454,75 +390,16 @@ impl WaveModel for Peachey {
     }
 
     fn add_displacement(&self, points: &Points, motion: &mut Motion) {
-        let mut up = [0f32; BLOCK];
-        for train in &self.trains {
-            for lane in 0..BLOCK {
-                let here = self.at(train, points.x[lane], points.y[lane]);
-                let (left, _) = left(here.wavenumber, points.footprint[lane]);
-                let (w, ..) = profile(here.cycles[0], here.shore[0] as f32);
-                up[lane] += here.amplitude[0] as f32 * left * w;
-            }
-        }
-        for lane in 0..BLOCK {
-            motion.dz[lane] += up[lane];
-        }
+        kernel::add_displacement(self, points, motion);
     }
 
     fn add_motion(&self, points: &Points, motion: &mut Motion) {
-        let (mut up, mut tilt_x, mut tilt_y) = ([0f32; BLOCK], [0f32; BLOCK], [0f32; BLOCK]);
-        let mut hidden = [[0f32; BLOCK]; 3];
-        for train in &self.trains {
-            for lane in 0..BLOCK {
-                let here = self.at(train, points.x[lane], points.y[lane]);
-                let (left, left_by) = left(here.wavenumber, points.footprint[lane]);
-                let [_, x, y] = here.cycles.map(|number| number as f32);
-                let [amplitude, amplitude_x, amplitude_y] = here.amplitude.map(|number| number as f32);
-                let [shore, shore_x, shore_y] = here.shore.map(|number| number as f32);
-                let (w, by_cycles, by_shore) = profile(here.cycles[0], shore);
-                up[lane] += amplitude * left * w;
-                let tilt = |phase: f32, by_amplitude: f32, by_left: f32, shored: f32| {
-                    (by_amplitude * left + amplitude * by_left) * w
-                        + amplitude * left * (by_cycles * phase + by_shore * shored)
-                };
-                tilt_x[lane] += tilt(x, amplitude_x, left_by[0], shore_x);
-                tilt_y[lane] += tilt(y, amplitude_y, left_by[1], shore_y);
-                let lost = (1.0 - left * left) * amplitude * amplitude * profile_steepness(shore);
-                for (hidden, part) in hidden.iter_mut().zip([x * x, x * y, y * y]) {
-                    hidden[lane] += lost * part;
-                }
-            }
-        }
-        for lane in 0..BLOCK {
-            motion.dz[lane] += up[lane];
-            motion.slope_x[lane] += tilt_x[lane];
-            motion.slope_y[lane] += tilt_y[lane];
-            motion.hidden_xx[lane] += hidden[0][lane];
-            motion.hidden_xy[lane] += hidden[1][lane];
-            motion.hidden_yy[lane] += hidden[2][lane];
-        }
+        kernel::add_motion(self, points, motion);
     }
 
     /// As under a linear wave of the local length that has the profile's surface.
     fn add_velocity(&self, points: &Points, depths: &[f32; BLOCK], velocity: &mut Velocity) {
-        for train in &self.trains {
-            let frequency = 1.0 / train.swell.period;
-            for lane in 0..BLOCK {
-                let here = self.at(train, points.x[lane], points.y[lane]);
-                let shore = here.shore[0] as f32;
-                let (left, _) = left(here.wavenumber, points.footprint[lane]);
-                let (w, by_cycles, _) = profile(here.cycles[0], shore);
-                let down = f64::from(if depths[lane] > 0.0 { depths[lane] } else { 0.0 });
-                let water = StillWater { depth: here.depth.max(0.01), ..StillWater::DEEP };
-                let (across, upright) = water.motion_below(here.wavenumber[0], -down);
-                let along = DVec2::new(here.cycles[1], here.cycles[2]).normalize_or_zero();
-                let rate = here.amplitude[0] * f64::from(left) * frequency;
-                // The profile's mean is no motion.
-                let forward = TAU * rate * across * f64::from(w + shore / 3.0);
-                velocity.x[lane] += (forward * along.x) as f32;
-                velocity.y[lane] += (forward * along.y) as f32;
-                velocity.z[lane] -= (rate * upright * f64::from(by_cycles)) as f32;
-            }
-        }
+        kernel::add_velocity(self, points, depths, velocity);
     }
 
     /// Curvature is infinite where crests are creases, which is wherever waves are longer than four times the depth.
@@ -538,20 +415,5 @@ impl WaveModel for Peachey {
         let index =
             libm::ceil(4.0 * libm::log2(f64::from(wavelength) * 1e3)).clamp(0.0, THRESHOLDS as f64 - 1.0) as usize;
         self.trains.iter().map(|train| train.rough[index]).sum()
-    }
-}
-
-/// How much of waves of a wave number is left in a footprint, and that by x and y: none of those shorter than twice the footprint, all of those
-/// twice as long again.
-fn left(wavenumber: Jet, footprint: f32) -> (f32, [f32; 2]) {
-    if footprint.is_nan() || footprint <= 0.0 {
-        return (1.0, [0.0; 2]);
-    }
-    let waves = PI / (wavenumber[0] * f64::from(footprint));
-    let by = |change: f64| (-waves / wavenumber[0] * change) as f32;
-    match waves - 1.0 {
-        left if left <= 0.0 => (0.0, [0.0; 2]),
-        left if left >= 1.0 => (1.0, [0.0; 2]),
-        left => (left as f32, [by(wavenumber[1]), by(wavenumber[2])]),
     }
 }

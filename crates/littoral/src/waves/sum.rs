@@ -14,7 +14,7 @@ mod grid;
 mod kernel;
 
 pub use grid::{Grid, GridScratch};
-pub(crate) use kernel::{COSINE, SINE, circle, small_circle};
+pub(crate) use kernel::{COSINE, SINE, circle, power_of_two, small_circle};
 
 /// Most waves in a sum.
 pub(crate) const MOST_WAVES: usize = 1 << 16;

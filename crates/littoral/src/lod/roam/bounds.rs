@@ -100,16 +100,13 @@ pub struct NestedBounds {
 /// The diamonds of the cells of one level and of their sides.
 #[derive(Clone, Debug)]
 struct Level<T = Bound> {
-    squares: Vec<T>,
-    /// Sides that run east: cells a side × (cells a side + 1), in tiles as the others.
-    east: Vec<T>,
-    /// Sides that run north: (cells a side + 1) × cells a side.
-    north: Vec<T>,
+    /// By [`Kind`], all in tiles: cells; cells a side × (cells a side + 1) sides that run east; (cells a side + 1) × cells a side that run north.
+    kinds: [Vec<T>; 3],
 }
 
 impl<T> Default for Level<T> {
     fn default() -> Level<T> {
-        Level { squares: Vec::new(), east: Vec::new(), north: Vec::new() }
+        Level { kinds: [const { Vec::new() }; 3] }
     }
 }
 
@@ -117,11 +114,9 @@ impl<T: Copy + Send + Sync> Level<T> {
     /// Something of each side of the level's cells, asked for by its middle in halves of a cell.
     fn sides(level: u8, empty: T, of: &(dyn Fn(u32, u32) -> T + Sync)) -> Level<T> {
         let n = 1u32 << level;
-        Level {
-            squares: Vec::new(),
-            east: tiled([n, n + 1], empty, &|[i, j]| of(2 * i + 1, 2 * j)),
-            north: tiled([n + 1, n], empty, &|[i, j]| of(2 * i, 2 * j + 1)),
-        }
+        let east = tiled([n, n + 1], empty, &|[i, j]| of(2 * i + 1, 2 * j));
+        let north = tiled([n + 1, n], empty, &|[i, j]| of(2 * i, 2 * j + 1));
+        Level { kinds: [Vec::new(), east, north] }
     }
 
     /// The same of each cell.
@@ -155,15 +150,12 @@ fn tile(i: u32, j: u32, columns: u32) -> usize {
 
 impl<T> Level<T> {
     /// What is kept of a diamond of cells of this level.
-    #[inline]
+    #[inline(always)]
     fn slot(&self, diamond: Diamond, level: u8) -> &T {
         let n = 1u32 << level;
         let [i, j] = [0, 1].map(|i| diamond.at[i] >> (Cell::MAX_LEVEL - level));
-        match diamond.base {
-            Base::Rising | Base::Falling => &self.squares[tile(i, j, n)],
-            Base::East => &self.east[tile(i, j, n)],
-            Base::North => &self.north[tile(i, j, n + 1)],
-        }
+        let kind = Kind::of(diamond.base);
+        &self.kinds[kind][tile(i, j, n + u32::from(kind == Kind::North as usize))]
     }
 }
 
@@ -177,6 +169,12 @@ pub(super) enum Kind {
 
 impl Kind {
     pub(super) const ALL: [Kind; 3] = [Kind::Square, Kind::East, Kind::North];
+
+    /// The number of the kind of the diamonds with a base.
+    #[inline(always)]
+    fn of(base: Base) -> usize {
+        (base as usize).saturating_sub(1)
+    }
 }
 
 /// The bounds of all diamonds of one level and kind.
@@ -261,7 +259,7 @@ impl NestedBounds {
             let sides = Level::sides(level, Bound::EMPTY, &|i, j| of(&bounds, i, j));
             bounds.levels[usize::from(level)] = sides;
             let squares = Level::squares(level, Bound::EMPTY, &|i, j| of(&bounds, i, j));
-            bounds.levels[usize::from(level)].squares = squares;
+            bounds.levels[usize::from(level)].kinds[0] = squares;
         }
         Ok(bounds)
     }
@@ -269,7 +267,7 @@ impl NestedBounds {
     /// Bytes of memory held, heights included.
     pub fn bytes(&self) -> usize {
         fn bytes<T>(levels: &[Level<T>]) -> usize {
-            let count = |level: &Level<T>| level.squares.len() + level.east.len() + level.north.len();
+            let count = |level: &Level<T>| level.kinds.iter().map(Vec::len).sum::<usize>();
             levels.iter().map(count).sum::<usize>() * size_of::<T>()
         }
         self.heights.len() * size_of::<f32>() + bytes(&self.levels) + bytes(&self.slopes)
@@ -339,7 +337,7 @@ impl NestedBounds {
     }
 
     /// Where the bound of a diamond above the level of the samples is kept.
-    #[inline]
+    #[inline(always)]
     fn slot(&self, diamond: Diamond) -> &Bound {
         let level = diamond.cell_level();
         self.levels[usize::from(level)].slot(diamond, level)
@@ -357,7 +355,7 @@ impl NestedBounds {
             let sides = Level::sides(level, Slopes::EMPTY, &|i, j| of(&self, i, j));
             self.slopes[usize::from(level)] = sides;
             let squares = Level::squares(level, Slopes::EMPTY, &|i, j| of(&self, i, j));
-            self.slopes[usize::from(level)].squares = squares;
+            self.slopes[usize::from(level)].kinds[0] = squares;
         }
         self
     }
@@ -425,12 +423,8 @@ impl NestedBounds {
     /// The bounds of the diamonds of a level above that of the samples.
     pub(super) fn table(&self, level: u8, kind: Kind) -> Table<'_> {
         let (all, n) = (&self.levels[usize::from(level)], 1 << level);
-        let (bounds, columns) = match kind {
-            Kind::Square => (&all.squares, n),
-            Kind::East => (&all.east, n),
-            Kind::North => (&all.north, n + 1),
-        };
-        Table { bounds, columns, unit: u32::from(self.finest + 1 - level) }
+        let columns = n + u32::from(kind == Kind::North);
+        Table { bounds: &all.kinds[kind as usize], columns, unit: u32::from(self.finest + 1 - level) }
     }
 
     /// What is the same in the items of a level and kind.

@@ -57,18 +57,17 @@ impl Diamond {
     pub const ROOT: Diamond = Diamond { at: [STEPS / 2; 2], half: STEPS / 2, base: Base::Rising };
 
     /// The diamond whose base has its middle at a point that is no corner of the face.
-    #[inline]
+    #[inline(always)]
     pub fn at(at: Point) -> Diamond {
-        let zeros = (at[0] | at[1]).trailing_zeros();
-        let half = 1 << zeros;
-        let [x, y] = [at[0] >> zeros, at[1] >> zeros];
-        let base = match (x & 1 == 1, y & 1 == 1) {
-            (true, true) if ((x >> 1) + (y >> 1)) & 1 == 0 => Base::Rising,
-            (true, true) => Base::Falling,
-            (true, false) => Base::East,
-            _ => Base::North,
+        // Looked up, since no processor foresees which way the next one's base runs.
+        const BASES: [Base; 8] = {
+            use Base::{East, Falling, North, Rising};
+            [North, East, North, Rising, North, East, North, Falling]
         };
-        Diamond { at, half, base }
+        let zeros = (at[0] | at[1]).trailing_zeros();
+        let [x, y] = [at[0] >> zeros, at[1] >> zeros];
+        let base = BASES[(x & 1 | (y & 1) << 1 | ((x ^ y) & 2) << 1) as usize];
+        Diamond { at, half: 1 << zeros, base }
     }
 
     /// Whether the base is a cell's diagonal.
@@ -95,7 +94,7 @@ impl Diamond {
         u64::from(self.at[0]) << 32 | u64::from(self.at[1])
     }
 
-    #[inline]
+    #[inline(always)]
     fn shifted(self, by: [i32; 2]) -> Option<Point> {
         let [x, y] = [self.at[0].wrapping_add_signed(by[0]), self.at[1].wrapping_add_signed(by[1])];
         (x <= STEPS && y <= STEPS).then_some([x, y])
@@ -139,18 +138,60 @@ impl Diamond {
     /// The diamonds that this one is a parent of.
     #[inline]
     pub fn children(self) -> [Option<Diamond>; 4] {
-        let h = self.half as i32;
-        let by = if self.is_square() {
-            [[0, -h], [h, 0], [0, h], [-h, 0]]
-        } else {
-            let q = h / 2;
-            [[-q, -q], [q, -q], [q, q], [-q, q]]
-        };
-        if !self.is_square() && self.half == 1 {
-            return [None; 4];
-        }
-        let child = |by: [i32; 2]| self.shifted(by).map(Diamond::at);
-        [child(by[0]), child(by[1]), child(by[2]), child(by[3])]
+        [0, 1, 2, 3].map(|i| self.child(i))
+    }
+
+    /// One of them: four at once are written to memory, and read before they have arrived there.
+    #[inline(always)]
+    pub fn child(self, i: usize) -> Option<Diamond> {
+        const TO: [[[i32; 2]; 4]; 2] = [[[0, -1], [1, 0], [0, 1], [-1, 0]], [[-1, -1], [1, -1], [1, 1], [-1, 1]]];
+        const BASES: [Base; 4] = [Base::Rising, Base::Falling, Base::East, Base::North];
+        let of_side = u32::from(!self.is_square());
+        let half = self.half >> of_side;
+        let at = self.shifted(TO[of_side as usize][i].map(|step| step * half as i32))?;
+        let zeros = half.checked_ilog2()?;
+        let falling = (at[0] ^ at[1]) >> zeros >> 1 & 1;
+        let base = BASES[if of_side == 1 { falling as usize } else { 2 + (i & 1) }];
+        Some(Diamond { at, half, base })
+    }
+
+    /// Which of a child's parents this is, in the order of its [`Diamond::apexes`], but at the border of the face.
+    #[inline(always)]
+    pub fn side_of(self, child: usize) -> usize {
+        let sides = if self.is_square() { 0b1100 } else { 0b0110 };
+        sides >> child & 1
+    }
+
+    /// The way to a child's other parent: through which of this diamond's parents, and as which child of that. To the other parent the child is the one
+    /// opposite, `child ^ 2`.
+    #[inline(always)]
+    pub fn beyond(self, child: usize) -> (usize, usize) {
+        // By the order of bases.
+        const THROUGH: [[u8; 4]; 4] = [[0, 0, 1, 1], [1, 0, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]];
+        const AS: [[u8; 4]; 4] = [[0, 2, 2, 0], [1, 1, 3, 3], [3, 1, 1, 3], [0, 0, 2, 2]];
+        let base = self.base as usize;
+        (usize::from(THROUGH[base][child]), usize::from(AS[base][child]))
+    }
+
+    /// The ends of a child's base, among this diamond's two ends and two apexes.
+    #[inline(always)]
+    pub fn child_ends<T: Copy>(self, known: [T; 4], child: usize) -> [T; 2] {
+        const ENDS: [[[u8; 2]; 4]; 4] = [
+            [[0, 2], [2, 1], [3, 1], [0, 3]],
+            [[3, 1], [1, 2], [0, 2], [3, 0]],
+            [[0, 3], [3, 1], [2, 1], [0, 2]],
+            [[2, 0], [0, 3], [1, 3], [2, 1]],
+        ];
+        ENDS[self.base as usize][child].map(|at| known[usize::from(at)])
+    }
+
+    /// Whether its triangle on a side runs clockwise by the order of the base's ends.
+    #[inline(always)]
+    pub fn turned(self, side: usize) -> bool {
+        let [x, y] = self.at;
+        // There the side that is missing is the first.
+        let shifted = self.base == Base::East && y == STEPS || self.base == Base::North && x == 0;
+        (self.base == Base::Rising) ^ (side == 1) ^ shifted
     }
 
     /// The cell whose diagonal the base is, or that lies on the side of `apex`.

@@ -38,6 +38,7 @@ mod drawn;
 mod foresight;
 mod queues;
 mod sea;
+mod step;
 #[cfg(test)]
 mod tests;
 
@@ -118,8 +119,8 @@ pub struct RoamFlight<'a, G = &'a NestedBounds> {
     lens: Option<Lens>,
     triangles: usize,
     mesh: Mesh,
-    /// Record and side of each triangle.
-    owners: Vec<u32>,
+    /// The record of each vertex but the corners: that of the diamond it is the middle of.
+    makers: Vec<u32>,
     unused_vertices: Vec<u32>,
     freed: Vec<u32>,
     changed: Changes,
@@ -179,7 +180,7 @@ impl<G: Ground> RoamFlight<'_, G> {
             lens: None,
             triangles: 0,
             mesh: Mesh::default(),
-            owners: Vec::new(),
+            makers: Vec::new(),
             unused_vertices: Vec::new(),
             freed: Vec::new(),
             changed: Changes::default(),
@@ -293,10 +294,11 @@ impl<G: Ground> RoamFlight<'_, G> {
         self.unused.clear();
         self.list.clear();
         self.mesh.clear();
-        self.owners.clear();
+        self.makers.clear();
         self.unused_vertices.clear();
         self.freed.clear();
         self.mesh.vertices.extend(CORNERS.map(|at| self.vertex(at)));
+        self.makers.extend([NONE; 4]);
         (0..4).for_each(|corner| Changes::mark(&mut self.changed.vertices, corner));
         let root = self.record(Diamond::ROOT, [0, 2]);
         self.triangles = 2;
@@ -387,179 +389,6 @@ impl<G: Ground> RoamFlight<'_, G> {
         let known = &mut self.records[record as usize];
         known.list = NOWHERE;
         self.list.remove(known.place);
-    }
-
-    /// Vertices at the apexes.
-    fn apexes(&self, known: &Record, diamond: Diamond) -> [u32; 2] {
-        if diamond == Diamond::ROOT {
-            return [1, 3];
-        }
-        known.parents.map(|parent| if parent == NONE { NONE } else { self.records[parent as usize].triangles[0] })
-    }
-
-    /// Through a parent to a child's other parent, and how the child lies to that.
-    #[inline]
-    fn beyond(&self, known: &Record, diamond: Diamond, child: usize) -> (u32, usize) {
-        let (parent, other, back) = if diamond.is_square() {
-            let (slot, own) = match (diamond.base, child) {
-                (Base::Rising, 0 | 1) => (0, 3),
-                (Base::Rising, _) => (1, 1),
-                (_, 1 | 2) => (0, 0),
-                _ => (1, 2),
-            };
-            (known.parents[slot], if child & 1 == 1 { own ^ 1 } else { 3 - own }, child ^ 2)
-        } else {
-            let (first, other) = match diamond.base {
-                Base::East => (child >= 2, [3, 1, 1, 3][child]),
-                _ => (child == 0 || child == 3, [0, 0, 2, 2][child]),
-            };
-            let slot = usize::from(known.parents[1] != NONE && !first);
-            (known.parents[slot], other, [2, 3, 0, 1][child])
-        };
-        (self.records.get(parent as usize).map_or(NONE, |parent| parent.children[other]), back)
-    }
-
-    /// The record of a split diamond's child, if the child's other parent has made it.
-    fn met(&self, known: &Record, diamond: Diamond, child: usize) -> Option<u32> {
-        let (other, back) = self.beyond(known, diamond, child);
-        let other = self.records.get(other as usize).filter(|other| other.split)?;
-        Some(other.children[back]).filter(|&child| child != NONE)
-    }
-
-    /// Splits a diamond that has both triangles.
-    fn split(&mut self, record: u32) {
-        let known = self.records[record as usize];
-        let diamond = Diamond::at(known.at);
-        self.operations.0 += 1;
-        self.triangles += cost(&known, diamond);
-        self.freed.extend(known.triangles.into_iter().filter(|&slot| slot != NONE));
-        let vertex = self.vertex(known.at);
-        let slot = match self.unused_vertices.pop() {
-            Some(slot) => {
-                self.mesh.vertices[slot as usize] = vertex;
-                slot
-            }
-            None => {
-                self.mesh.vertices.push(vertex);
-                self.mesh.vertices.len() as u32 - 1
-            }
-        };
-        Changes::mark(&mut self.changed.vertices, slot);
-        let own = &mut self.records[record as usize];
-        (own.split, own.triangles) = (true, [slot, NONE]);
-        for parent in known.parents {
-            if parent != NONE {
-                self.records[parent as usize].kids += 1;
-                if self.records[parent as usize].list == MERGE {
-                    self.leave(parent);
-                }
-            }
-        }
-        let apexes = self.apexes(&known, diamond);
-        for (i, child) in diamond.children().into_iter().enumerate() {
-            let Some(child) = child else { continue };
-            let ends = child_ends(diamond, known.ends, apexes, i);
-            let of = match self.met(&known, diamond, i) {
-                Some(of) => of,
-                None => self.record(child, ends),
-            };
-            let border = at_border(child);
-            let side = if border { 0 } else { side_of_parent(diamond, i) };
-            self.records[record as usize].children[i] = of;
-            let held = &mut self.records[of as usize];
-            held.parents[side] = record;
-            held.held += 1;
-            let complete = held.held == if border { 1 } else { 2 };
-            if held.bound.whole(side) {
-                let [a, b] = ends;
-                self.put(of, side, if i < 2 { [a, b, slot] } else { [b, a, slot] });
-            }
-            if complete {
-                let list = self.idle(child);
-                self.join(of, list);
-            }
-        }
-        self.turn(record, diamond, MERGE);
-    }
-
-    /// Merges a split diamond that has no split child.
-    fn merge(&mut self, record: u32) {
-        let known = self.records[record as usize];
-        let diamond = Diamond::at(known.at);
-        self.operations.1 += 1;
-        self.triangles -= cost(&known, diamond);
-        for child in known.children {
-            if child == NONE {
-                continue;
-            }
-            let of = &mut self.records[child as usize];
-            let side = usize::from(of.parents[0] != record);
-            if of.triangles[side] != NONE {
-                self.freed.push(of.triangles[side]);
-                of.triangles[side] = NONE;
-            }
-            of.parents[side] = NONE;
-            of.held -= 1;
-            let (list, held) = (of.list, of.held);
-            if list != NOWHERE {
-                self.leave(child);
-            }
-            if held == 0 {
-                self.unused.push(child);
-            }
-        }
-        self.bounds.forget(known.triangles[0]);
-        self.unused_vertices.push(known.triangles[0]);
-        let own = &mut self.records[record as usize];
-        (own.split, own.triangles, own.children) = (false, [NONE; 2], [NONE; 4]);
-        let apexes = self.apexes(&known, diamond);
-        for (side, apex) in apexes.into_iter().enumerate() {
-            if apex != NONE {
-                self.draw(record, diamond, side, apex);
-            }
-        }
-        let kind = self.idle(diamond);
-        self.turn(record, diamond, kind);
-        for parent in known.parents {
-            if parent != NONE {
-                self.records[parent as usize].kids -= 1;
-                if self.records[parent as usize].kids == 0 {
-                    self.join(parent, MERGE);
-                }
-            }
-        }
-    }
-}
-
-/// Which parent of its child a diamond is, but at the border of the face.
-#[inline]
-fn side_of_parent(diamond: Diamond, child: usize) -> usize {
-    usize::from(if diamond.is_square() { child >= 2 } else { child == 1 || child == 2 })
-}
-
-/// The ends of a child's base: one of its parent's ends, and one of its apexes.
-#[inline]
-fn child_ends(diamond: Diamond, ends: [u32; 2], apexes: [u32; 2], child: usize) -> [u32; 2] {
-    let [a, b] = ends;
-    let [p, q] = apexes;
-    match (diamond.base, child) {
-        (Base::Rising, 0) => [a, p],
-        (Base::Rising, 1) => [p, b],
-        (Base::Rising, 2) => [q, b],
-        (Base::Rising, _) => [a, q],
-        (Base::Falling, 0) => [q, b],
-        (Base::Falling, 1) => [b, p],
-        (Base::Falling, 2) => [a, p],
-        (Base::Falling, _) => [q, a],
-        // At the border there is one apex only, whichever side it is on.
-        (Base::East, 0) => [a, if q == NONE { p } else { q }],
-        (Base::East, 1) => [if q == NONE { p } else { q }, b],
-        (Base::East, 2) => [p, b],
-        (Base::East, _) => [a, p],
-        (Base::North, 0) => [p, a],
-        (Base::North, 1) => [a, if q == NONE { p } else { q }],
-        (Base::North, 2) => [b, if q == NONE { p } else { q }],
-        (Base::North, _) => [p, b],
     }
 }
 

@@ -40,6 +40,21 @@ pub(super) trait Ground {
 
     fn priority(&self, lens: &Lens, item: &Item, slopes: Option<Slopes>) -> f32;
 
+    /// Priorities of the first few of four.
+    #[inline]
+    fn priorities(
+        &self,
+        lens: &Lens,
+        items: &[Item; 4],
+        slopes: &[Option<Slopes>; 4],
+        count: usize,
+        out: &mut [f32; 4],
+    ) {
+        for i in 0..count {
+            out[i] = self.priority(lens, &items[i], slopes[i]);
+        }
+    }
+
     /// Priorities of many, with as many slopes or none: numbers keep their signs, and what is none stays so.
     fn measure(&self, lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]);
 
@@ -102,6 +117,18 @@ impl Ground for &NestedBounds {
     #[inline]
     fn priority(&self, lens: &Lens, item: &Item, slopes: Option<Slopes>) -> f32 {
         lens.priority(item, slopes)
+    }
+
+    #[inline]
+    fn priorities(
+        &self,
+        lens: &Lens,
+        items: &[Item; 4],
+        slopes: &[Option<Slopes>; 4],
+        count: usize,
+        out: &mut [f32; 4],
+    ) {
+        lens.priorities(items, slopes, count, out);
     }
 
     fn measure(&self, lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {

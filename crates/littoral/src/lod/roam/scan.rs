@@ -97,6 +97,17 @@ impl Lens {
         extent(self, item.at, item.heights, item.word)
     }
 
+    /// The priorities of the first few of four.
+    #[inline]
+    pub(super) fn priorities(&self, items: &[Item; 4], slopes: &[Option<Slopes>; 4], count: usize, out: &mut [f32; 4]) {
+        if count > 1 && self.priority == Priority::ScreenError && !self.voids && self.weights.is_none() {
+            return four_errors(self, items, out);
+        }
+        for i in 0..count {
+            out[i] = self.priority(&items[i], slopes[i]);
+        }
+    }
+
     /// The priority of one.
     pub(super) fn priority(&self, item: &Item, slopes: Option<Slopes>) -> f32 {
         let Item { at, heights, deviation, word } = *item;
@@ -108,6 +119,14 @@ impl Lens {
             Some(weights) if number > 0.0 => number * weights.of(&self.extent(item), slopes.unwrap_or(Slopes::EMPTY)),
             _ => number,
         }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn four_errors(lens: &Lens, items: &[Item; 4], out: &mut [f32; 4]) {
+    for i in 0..4 {
+        let Item { at, heights, deviation, word } = items[i];
+        out[i] = priority::<true, false>(lens, at, heights, deviation, word);
     }
 }
 
@@ -127,6 +146,9 @@ pub(super) struct Item {
 }
 
 impl Item {
+    /// None in particular.
+    pub(super) const NOTHING: Item = Item { at: 0, heights: 0, deviation: 0.0, word: 0 };
+
     /// Bits of a record's number.
     pub(super) const RECORD_BITS: u32 = 25;
 

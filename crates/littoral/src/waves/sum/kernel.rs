@@ -574,7 +574,7 @@ pub(super) fn add_velocity(sum: &Sum, points: &Points, depths: &[f32; BLOCK], ve
 
 /// 2^x for x ≤ 0, to 2·10⁻⁷ of it; not below 2^−126.
 #[inline(always)]
-fn power_of_two(x: f32) -> f32 {
+pub(crate) fn power_of_two(x: f32) -> f32 {
     // Adding this leaves the nearest whole number in the low bits.
     const SHIFT: f32 = 12_582_912.0;
     let x = x.clamp(-126.0, 0.0);

@@ -50,46 +50,51 @@ impl<G: Ground> RoamFlight<'_, G> {
             return;
         }
         let [a, b] = known.ends;
-        // Clockwise by the order of the base's ends?
-        let towards = diamond.apexes()[side].expect("a triangle on this side");
-        let turned = match diamond.base {
-            Base::Rising | Base::North => towards[0] > diamond.at[0],
-            Base::Falling => towards[0] < diamond.at[0],
-            Base::East => towards[1] < diamond.at[1],
-        };
-        self.put(record, side, if turned { [b, a, apex] } else { [a, b, apex] });
+        let turned = usize::from(diamond.turned(side));
+        self.put(record, side, [[a, b][turned], [a, b][1 - turned], apex]);
     }
 
-    /// Adds a triangle of a diamond.
+    /// Adds a triangle of a diamond; its apex comes last.
     #[inline(always)]
     pub(super) fn put(&mut self, record: u32, side: usize, triangle: [u32; 3]) {
-        let owner = 2 * record + side as u32;
         let slot = match self.freed.pop() {
             Some(slot) => {
                 self.mesh.triangles[slot as usize] = triangle;
-                self.owners[slot as usize] = owner;
                 slot
             }
             None => {
                 self.mesh.triangles.push(triangle);
-                self.owners.push(owner);
-                self.owners.len() as u32 - 1
+                self.mesh.triangles.len() as u32 - 1
             }
         };
         Changes::mark(&mut self.changed.triangles, slot);
         self.records[record as usize].triangles[side] = slot;
     }
 
+    /// Whose triangle it is: a record and a side. Asked only where triangles become fewer, so that splits need not write it down.
+    fn owner(&self, [a, b, apex]: [u32; 3]) -> (u32, usize) {
+        let parent = self.makers[apex as usize];
+        if parent == NONE {
+            return (0, usize::from(apex != 1));
+        }
+        let [a, b] = [a, b].map(|vertex| self.mesh.vertices[vertex as usize]);
+        let middle = [a.x.midpoint(b.x), a.y.midpoint(b.y)];
+        let known = &self.records[parent as usize];
+        let diamond = Diamond::at(known.at);
+        let child = (0..4).find(|&i| diamond.child(i).is_some_and(|child| child.at == middle));
+        let child = known.children[child.expect("a triangle's apex made the middle of its base")];
+        (child, usize::from(self.records[child as usize].parents[0] != parent))
+    }
+
     /// Closes the gaps that merges left among the triangles.
     pub(super) fn compact(&mut self) {
         self.freed.sort_unstable();
         while let Some(slot) = self.freed.pop() {
-            let owner = self.owners.pop().expect("as many owners as triangles");
             let triangle = self.mesh.triangles.pop().expect("freed triangles are there");
-            if (slot as usize) < self.owners.len() {
-                self.owners[slot as usize] = owner;
+            if (slot as usize) < self.mesh.triangles.len() {
+                let (record, side) = self.owner(triangle);
                 self.mesh.triangles[slot as usize] = triangle;
-                self.records[owner as usize / 2].triangles[owner as usize & 1] = slot;
+                self.records[record as usize].triangles[side] = slot;
                 Changes::mark(&mut self.changed.triangles, slot);
             }
         }

@@ -15,12 +15,10 @@ impl<G: Ground> RoamFlight<'_, G> {
         }
     }
 
-    /// Where a triangle is kept, and its owner.
     #[inline]
     fn expect_triangle(&self, slot: u32) {
         if let Some(triangle) = self.mesh.triangles.get(slot as usize) {
             prefetch(triangle);
-            prefetch(&self.owners[slot as usize]);
         }
     }
 
@@ -45,17 +43,13 @@ impl<G: Ground> RoamFlight<'_, G> {
                         self.list.expect(parent.place);
                     }
                 }
-                (0..4).for_each(|child| self.expect_record(self.beyond(known, diamond, child).0));
+                (0..4).for_each(|child| self.expect_record(self.beyond(known, diamond, child)));
             }
             _ => {
-                for (i, child) in diamond.children().into_iter().enumerate() {
-                    let Some(child) = child else { continue };
-                    let (other, back) = self.beyond(known, diamond, i);
-                    match self
-                        .records
-                        .get(other as usize)
-                        .and_then(|other| self.records.get(other.children[back] as usize))
-                    {
+                for i in 0..4 {
+                    let Some(child) = diamond.child(i) else { continue };
+                    let other = self.records.get(self.beyond(known, diamond, i) as usize);
+                    match other.and_then(|other| self.records.get(other.children[i ^ 2] as usize)) {
                         Some(there) => prefetch(there),
                         None => self.bounds.expect_bound(child),
                     }
@@ -72,10 +66,9 @@ impl<G: Ground> RoamFlight<'_, G> {
                 self.expect_record(record);
             }
         }
-        if let Some(vertex) =
-            self.unused_vertices.iter().nth_back(4).and_then(|&at| self.mesh.vertices.get(at as usize))
-        {
-            prefetch(vertex);
+        if let Some(&vertex) = self.unused_vertices.iter().nth_back(4) {
+            prefetch(&self.mesh.vertices[vertex as usize]);
+            prefetch(&self.makers[vertex as usize]);
         }
         self.list.expect_room();
     }
@@ -85,8 +78,8 @@ impl<G: Ground> RoamFlight<'_, G> {
     pub(super) fn foresee_child(&self, record: u32) {
         self.foresee_split(record, 1);
         self.foresee_split(record, 2);
-        let children = Diamond::at(self.records[record as usize].at).children();
-        children.into_iter().flatten().for_each(|child| self.bounds.expect_bound(child));
+        let diamond = Diamond::at(self.records[record as usize].at);
+        (0..4).filter_map(|i| diamond.child(i)).for_each(|child| self.bounds.expect_bound(child));
     }
 
     /// One hop of what the merge of a record asks for.

@@ -208,7 +208,8 @@ impl<G: Ground> RoamFlight<'_, G> {
                 stopped = true;
                 break;
             }
-            let (top, last) = self.next();
+            // What is no longer true is dropped when its turn comes; until then it stands for what is behind it.
+            let (top, last) = (self.splits.peek(), self.merges.peek().map(Key::reversed));
             let agreed = matches!((top, last), (Some(top), Some(last)) if top < last) && self.triangles + 1 >= budget;
             if pressed && (agreed || top.is_none() || last.is_none()) {
                 // There is time for what is less urgent.
@@ -223,6 +224,10 @@ impl<G: Ground> RoamFlight<'_, G> {
                 _ if self.triangles > budget => true,
                 // Nothing is split that need not be; but first comes what is missing, lest a stopped frame only lose triangles.
                 (None, Some(last)) if last.number() <= tolerance => true,
+                (Some(top), _) if !self.valid(top, SPLIT) => {
+                    self.splits.pop();
+                    continue;
+                }
                 (Some(top), _) => {
                     let known = &self.records[top.record() as usize];
                     if self.triangles + cost(known, Diamond::at(known.at)) <= budget {
@@ -238,7 +243,8 @@ impl<G: Ground> RoamFlight<'_, G> {
                         None => break,
                     }
                 }
-                (None, last) => {
+                (None, _) => {
+                    let (_, last) = self.next();
                     // Is there anything below the band, for which there is room or something lower to be merged?
                     let full = self.triangles + 1 > budget;
                     if self.band.0 <= tolerance || full && last.is_none_or(|last| last.number() > self.band.0) {
@@ -254,6 +260,9 @@ impl<G: Ground> RoamFlight<'_, G> {
                 match last {
                     Some(last) => {
                         self.merges.pop();
+                        if !self.valid(last, MERGE) {
+                            continue;
+                        }
                         self.foresee_merges();
                         self.merge(last.record());
                     }
