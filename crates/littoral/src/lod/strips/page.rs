@@ -255,7 +255,7 @@ impl Page {
             see(&lens, &stage, rows);
         }
         let mut judged = if stage.near {
-            look_near(asked, &lens, self.at(level, 0, 0), wanted != Wanted::Sight, rows)
+            look_near(asked, &lens, &stage, self.at(level, 0, 0), wanted != Wanted::Sight, rows)
         } else if wanted == Wanted::Sight {
             rows.above.fill(0);
             Judged::default()

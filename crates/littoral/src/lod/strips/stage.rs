@@ -178,7 +178,7 @@ impl Stage {
         let inside = crossed == [false; 5];
         let whole = asked.field.error(page).is_finite() && !asked.field.range(page).is_empty();
         let apart = |[low, high]: [f32; 2]| low.max(-high).max(0.0);
-        let away = apart(columns).hypot(apart(rows)).hypot(apart([slab.low, slab.high]));
+        let away = (square(apart(columns)) + square(apart(rows)) + square(apart([slab.low, slab.high]))).sqrt();
         let near = away < slab.high - slab.low;
         let mut down = [0.0; ACROSS * ACROSS + 1];
         let all = slabs.as_flattened().iter().chain([&slab]);
@@ -501,11 +501,18 @@ mod wide {
 
 /// Says which cells near the eye may lie within the frame, of those of which `seen` says so, and, if asked to, judges them, each by its own heights and those of
 /// the cells beside it; `first` is the level's first cell.
-pub(super) fn look_near(asked: &Asked, lens: &Lens, first: Cell, judges: bool, rows: &mut Rows) -> Judged {
+pub(super) fn look_near(
+    asked: &Asked,
+    lens: &Lens,
+    stage: &Stage,
+    first: Cell,
+    judges: bool,
+    rows: &mut Rows,
+) -> Judged {
     let mut judged = Judged::default();
     let (seams, apart) = if lens.cuts { (SEAMS, 0.0) } else { (1.0, lens.tolerance / SEAMS) };
     let cells = 1i64 << first.level;
-    let beyond = Vec3::new(lens.beyond[0], lens.beyond[1], 0.0);
+    let eye = asked.metric.eye().z;
     for y in 0..1usize << lens.level {
         rows.above[y] = 0;
         let mut left = rows.cells[y] & rows.seen[y];
@@ -531,9 +538,12 @@ pub(super) fn look_near(asked: &Asked, lens: &Lens, first: Cell, judges: bool, r
             let beside = ranges.iter().flat_map(|row| &row[at..at + 3]);
             let all = beside.fold(HeightRange::EMPTY, |all, range| all.union(*range));
             let range = if lens.cuts { all } else { ranges[1][at + 1] };
-            let cell = Cell { x: first.x + x, y: first.y + y as u32, ..first };
-            let own = asked.metric.bounds(cell, range);
-            let bounds = Bounds { low: own.low - beyond, high: own.high + beyond };
+            let ([west, east], [south, north]) = (lens.columns(x as i32), lens.rows(y as i32));
+            let [low, high] = [range.low, range.high].map(|height| (f64::from(height) - eye) as f32);
+            let bounds = Bounds {
+                low: Vec3::new(west, south, low) - stage.slack,
+                high: Vec3::new(east, north, high) + stage.slack,
+            };
             if !asked.metric.sees(&bounds) {
                 rows.seen[y] &= !(1 << x);
                 continue;
