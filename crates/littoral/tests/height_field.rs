@@ -105,11 +105,11 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
         let places: Vec<Place> = (0..25).map(|i| at(f64::from(i % 5) / 4.0, f64::from(i / 5) / 4.0)).collect();
         let mut bulk = [0.0; 25];
         field.heights(&places, &mut bulk);
-        // Points of the lattice: the corners alone, and with what lies between.
+        // Points of the lattice: the corners alone, with what lies between, and again and again.
         let points: Vec<[u32; 2]> =
             places.iter().map(|p| (p.uv * f64::from(1u32 << 30)).as_uvec2().to_array()).collect();
         let on_lattice = |i: &usize| glam::UVec2::from(points[*i]).as_dvec2() == places[*i].uv * f64::from(1u32 << 30);
-        for some in [vec![0, 4, 20, 24], (0..25).collect::<Vec<usize>>()] {
+        for some in [vec![0, 4, 20, 24], (0..25).collect(), (0..200).map(|i| i * 7 % 25).collect::<Vec<usize>>()] {
             let some: Vec<usize> = some.into_iter().filter(on_lattice).collect();
             let mut vertices = Vec::new();
             field.raise(3, &some.iter().map(|&i| points[i]).collect::<Vec<_>>(), &mut vertices);

@@ -140,18 +140,33 @@ pub trait HeightField: Sync {
 
     /// Adds vertices at points of a face's lattice, 2³⁰ steps a side, with the heights there. Overridden where bulk is faster.
     fn raise(&self, face: u8, points: &[[u32; 2]], vertices: &mut Vec<Vertex>) {
+        // The same points come again, as strips have their neighbours' vertices, and heights are dear: the last ones are remembered.
         const SOME: usize = 64;
+        const SLOTS: usize = 1024;
+        let mut seen = [([u32::MAX; 2], 0); SLOTS];
         let (mut places, mut heights) = ([Place { face, uv: DVec2::ZERO }; SOME], [0.0; SOME]);
+        let (mut asked, mut again) = ([0; SOME], [(0, 0); SOME]);
         let step = f64::exp2(-f64::from(Cell::MAX_LEVEL));
         for points in points.chunks(SOME) {
-            let (places, heights) = (&mut places[..points.len()], &mut heights[..points.len()]);
-            for (place, &[x, y]) in places.iter_mut().zip(points) {
-                place.uv = DVec2::new(f64::from(x), f64::from(y)) * step;
+            let (mut new, mut known) = (0, 0);
+            for &[x, y] in points {
+                let at = vertices.len();
+                vertices.push(Vertex { x, y, face: face.into(), height: f32::NAN });
+                let key = (u64::from(x) << 32 | u64::from(y)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                let slot = &mut seen[(key >> 54) as usize % SLOTS];
+                if slot.0 == [x, y] {
+                    again[known] = (at, slot.1);
+                    known += 1;
+                    continue;
+                }
+                *slot = ([x, y], at);
+                places[new].uv = DVec2::new(f64::from(x), f64::from(y)) * step;
+                asked[new] = at;
+                new += 1;
             }
-            self.heights(places, heights);
-            let raised =
-                points.iter().zip(heights).map(|(&[x, y], height)| Vertex { x, y, face: face.into(), height: *height });
-            vertices.extend(raised);
+            self.heights(&places[..new], &mut heights[..new]);
+            asked[..new].iter().zip(&heights).for_each(|(&at, &height)| vertices[at].height = height);
+            again[..known].iter().for_each(|&(at, before)| vertices[at].height = vertices[before].height);
         }
     }
 }
