@@ -1,7 +1,7 @@
 //! Pages before the eye: which of their cells may be seen, and how far off they would be drawn.
 //!
-//! How near and how visible a cell is is a matter of its place and of the slab of heights about it. Columns are worked out once for a level, slabs once for its
-//! rows within a block, and what is left for each row are a root and a quotient for sixteen cells at once.
+//! How near and how visible a cell is is a matter of its place and of the slab of heights about it. Columns are worked out once for a level, slabs once for
+//! a page, and what is left are a few products for sixteen cells at once: bounds are compared by their squares, without roots and quotients.
 
 use super::super::metric::Bounds;
 use super::page::{Asked, SEAMS, SIDE};
@@ -302,8 +302,10 @@ fn judge_rows(lens: &Lens, stage: &Stage, rows: &mut Rows) -> Judged {
         let [south, north] = lens.rows(y as i32);
         let ahead = lesser(lens.forward[1], south, north);
         let far = square(farther(south, north) + stage.slack);
-        let asked = rows.cells[y] & rows.whole[y] & rows.seen[y];
-        for x in (0..side).filter(|x| asked >> x & 1 == 1) {
+        let mut asked = rows.cells[y] & rows.whole[y] & rows.seen[y];
+        while asked != 0 {
+            let x = asked.trailing_zeros() as usize;
+            asked &= asked - 1;
             let down = stage.down[stage.block(lens.level, x, y)];
             let reach = Reach { ahead: columns[x].ahead + down + ahead, far: columns[x].far + far };
             rows.above[y] |= u64::from(judge.look(reach, rows.errors[rows.index(x, y)])) << x;
