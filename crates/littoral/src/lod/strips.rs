@@ -218,7 +218,7 @@ impl Strips {
         // Most of what is allowed: a guess that is meant to fit should not just fail to.
         let aim = most as f64 * 0.94;
         // The finest bound that is known to be too fine and the coarsest one that fits, with the triangles they take.
-        let (mut fine, mut fits): (Option<(f64, f64)>, Option<(f64, f64)>) = (None, None);
+        let (mut fine, mut fits) = (None::<(f64, f64)>, None::<(f64, f64)>);
         let (mut guess, mut reached, mut stands) = (f64::from(metric.tolerance()), 0.0, true);
         for tries in 0.. {
             match self.refine(field, metric, guess as f32) {

@@ -373,7 +373,7 @@ fn wide_write(points: &mut [Point], run: &Run) {
     while x < 4 || x < cells {
         let (finer, over) = (finer >> x & 3, over >> x & 3);
         // Both pairs of a cell below finer ones, the second of others; ahead by two cells below a coarser one.
-        let said = 0xcc | 3 * _pdep_u64(finer, 0x11) as u8;
+        let said = 0xcc | (3 * _pdep_u64(finer, 0x11) as u8);
         let ahead = _mm512_mask_add_epi32(pairs, _pdep_u64(over, 0x4040) as u16, pairs, width);
         let Some(points) = points[length..].first_chunk_mut::<8>() else { return };
         // SAFETY: as above.
