@@ -300,7 +300,7 @@ impl<G: Ground> RoamFlight<'_, G> {
         self.mesh.vertices.extend(CORNERS.map(|at| self.vertex(at)));
         self.makers.extend([NONE; 4]);
         (0..4).for_each(|corner| Changes::mark(&mut self.changed.vertices, corner));
-        let root = self.record(Diamond::ROOT, [0, 2]);
+        let root = self.record(Diamond::ROOT, [0, 2], self.bounds.bound(Diamond::ROOT));
         self.triangles = 2;
         self.draw(root, Diamond::ROOT, 0, 1);
         self.draw(root, Diamond::ROOT, 1, 3);
@@ -326,8 +326,8 @@ impl<G: Ground> RoamFlight<'_, G> {
         if diamond.cell_level() < self.finest() { SPLIT } else { STUCK }
     }
 
-    fn record(&mut self, diamond: Diamond, ends: [u32; 2]) -> u32 {
-        let bound = self.bounds.bound(diamond);
+    #[inline(always)]
+    fn record(&mut self, diamond: Diamond, ends: [u32; 2], bound: Bound) -> u32 {
         let unused = self.unused.pop();
         let place = unused.unwrap_or(self.records.len() as u32);
         if unused.is_none() {

@@ -40,19 +40,10 @@ pub(super) trait Ground {
 
     fn priority(&self, lens: &Lens, item: &Item, slopes: Option<Slopes>) -> f32;
 
-    /// Priorities of the first few of four.
+    /// Priorities of four at once, if that is quicker and nothing but the items is needed.
     #[inline]
-    fn priorities(
-        &self,
-        lens: &Lens,
-        items: &[Item; 4],
-        slopes: &[Option<Slopes>; 4],
-        count: usize,
-        out: &mut [f32; 4],
-    ) {
-        for i in 0..count {
-            out[i] = self.priority(lens, &items[i], slopes[i]);
-        }
+    fn priorities(&self, _: &Lens, _: &[Item; 4]) -> Option<[f32; 4]> {
+        None
     }
 
     /// Priorities of many, with as many slopes or none: numbers keep their signs, and what is none stays so.
@@ -120,15 +111,8 @@ impl Ground for &NestedBounds {
     }
 
     #[inline]
-    fn priorities(
-        &self,
-        lens: &Lens,
-        items: &[Item; 4],
-        slopes: &[Option<Slopes>; 4],
-        count: usize,
-        out: &mut [f32; 4],
-    ) {
-        lens.priorities(items, slopes, count, out);
+    fn priorities(&self, lens: &Lens, items: &[Item; 4]) -> Option<[f32; 4]> {
+        lens.priorities(items)
     }
 
     fn measure(&self, lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {

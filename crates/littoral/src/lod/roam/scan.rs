@@ -97,15 +97,11 @@ impl Lens {
         extent(self, item.at, item.heights, item.word)
     }
 
-    /// The priorities of the first few of four.
+    /// The priorities of four, where neither factors nor voids have a say.
     #[inline]
-    pub(super) fn priorities(&self, items: &[Item; 4], slopes: &[Option<Slopes>; 4], count: usize, out: &mut [f32; 4]) {
-        if count > 1 && self.priority == Priority::ScreenError && !self.voids && self.weights.is_none() {
-            return four_errors(self, items, out);
-        }
-        for i in 0..count {
-            out[i] = self.priority(&items[i], slopes[i]);
-        }
+    pub(super) fn priorities(&self, items: &[Item; 4]) -> Option<[f32; 4]> {
+        let plain = self.priority == Priority::ScreenError && !self.voids && self.weights.is_none();
+        plain.then(|| four_errors(self, items))
     }
 
     /// The priority of one.
@@ -123,11 +119,12 @@ impl Lens {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn four_errors(lens: &Lens, items: &[Item; 4], out: &mut [f32; 4]) {
-    for i in 0..4 {
-        let Item { at, heights, deviation, word } = items[i];
-        out[i] = priority::<true, false>(lens, at, heights, deviation, word);
+fn four_errors(lens: &Lens, items: &[Item; 4]) -> [f32; 4] {
+    let mut out = [0.0; 4];
+    for (out, &Item { at, heights, deviation, word }) in out.iter_mut().zip(items) {
+        *out = priority::<true, false>(lens, at, heights, deviation, word);
     }
+    out
 }
 
 /// What the priority of a diamond is computed from, and who it is: sixteen bytes.

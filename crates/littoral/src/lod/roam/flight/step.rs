@@ -109,7 +109,7 @@ impl<G: Ground> RoamFlight<'_, G> {
         let ends = diamond.child_ends(family.corners, i);
         let of = match self.met(known, diamond, i) {
             Some(of) => of,
-            None => self.record(child, ends),
+            None => self.record(child, ends, self.bounds.bound(child)),
         };
         let border = at_border(child);
         let side = if border { 0 } else { diamond.side_of(i) };
@@ -132,22 +132,19 @@ impl<G: Ground> RoamFlight<'_, G> {
     /// Puts children that have both triangles in the list.
     #[inline(always)]
     fn join_all(&mut self, family: &Family) {
-        let slopes = std::array::from_fn(|i| {
-            let known = (i < family.whole).then(|| &self.records[family.children[i] as usize])?;
-            self.bounds.slopes(Diamond::at(known.at))
-        });
-        let mut numbers = [0.0; 4];
-        if let Some(lens) = &self.lens {
-            self.bounds.priorities(lens, &family.items, &slopes, family.whole, &mut numbers);
-        }
+        let lens = self.lens.as_ref();
+        let together = lens.filter(|_| family.whole > 1).and_then(|lens| self.bounds.priorities(lens, &family.items));
         for i in 0..family.whole {
             let (item, child) = (family.items[i], family.children[i]);
+            let diamond = Diamond::at(self.records[child as usize].at);
+            let slopes = self.bounds.slopes(diamond);
+            let alone = || self.lens.as_ref().map_or(0.0, |lens| self.bounds.priority(lens, &item, slopes));
+            let priority = together.map_or_else(alone, |priorities| priorities[i]);
             let kind = (item.word & 3) as u8;
-            let place = self.list.add(item, slopes[i], numbers[i], kind);
+            let place = self.list.add(item, slopes, priority, kind);
             let known = &mut self.records[child as usize];
             (known.place, known.list) = (place, kind);
-            let diamond = Diamond::at(known.at);
-            self.enqueue(child, diamond, kind, numbers[i]);
+            self.enqueue(child, diamond, kind, priority);
         }
     }
 

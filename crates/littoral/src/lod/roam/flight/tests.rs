@@ -133,6 +133,34 @@ fn factors() -> impl Strategy<Value = Factors> {
     })
 }
 
+/// Four measured at once have the priorities that each has alone, to the bit.
+#[test]
+fn four_at_once_are_as_each_alone() {
+    let at = |i: usize| ((i % 65) as f32, (i / 65) as f32);
+    let heights: Vec<f32> = (0..65 * 65).map(at).map(|(x, y)| 9.0 * (0.3 * x).sin() + 7.0 * (0.2 * y).cos()).collect();
+    let bounds = NestedBounds::of(&land(65, 65, &heights)).expect("few samples");
+    let mut seen = 0;
+    for turn in 0..8 {
+        let yaw = f64::from(turn);
+        let eye = DVec3::new(90.0, 60.0, 20.0 + 2.0 * yaw);
+        let view = View::looking_at(eye, eye + DVec3::new(yaw.cos(), yaw.sin(), -0.3), 1.0, UVec2::new(640, 480));
+        let metric = ScreenMetric::new(&view, bounds.datum()).expect("a view");
+        let lens = bounds.lens(&metric, Priority::ScreenError, &Factors::default());
+        let mut level = vec![Diamond::ROOT];
+        for _ in 0..11 {
+            level = level.iter().flat_map(|diamond| diamond.children()).flatten().collect();
+            for four in level.chunks_exact(4) {
+                let items = [0, 1, 2, 3].map(|i| bounds.item(four[i], SPLIT, i as u32));
+                let together = lens.priorities(&items).expect("neither voids nor factors");
+                let alone = items.map(|item| lens.priority(&item, None));
+                assert_eq!(together.map(f32::to_bits), alone.map(f32::to_bits), "{four:?}");
+                seen += alone.iter().filter(|number| **number > 0.0).count();
+            }
+        }
+    }
+    assert!(seen > 1000, "{seen}");
+}
+
 /// Each factor moves triangles to where it should.
 #[test]
 fn factors_move_triangles() {
