@@ -49,13 +49,18 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
             assert_eq!(field.stencil_error(cell, depth), most, "{cell:?}: {depth} levels below");
         }
         let count = (side - cell.x).min(5) as usize;
-        let (mut ranges, mut errors, mut alone) = ([HeightRange::EMPTY; 5], [f32::NAN; 5], [f32::NAN; 5]);
+        let (mut ranges, mut errors) = ([HeightRange::EMPTY; 5], [f32::NAN; 5]);
         field.row(cell, &mut ranges[..count], &mut errors[..count]);
-        field.errors(cell, &mut alone[..count]);
         for i in 0..count {
             let cell = Cell { x: cell.x + i as u32, ..cell };
             assert_eq!((ranges[i], errors[i]), (field.range(cell), field.error(cell)), "{cell:?} in a row");
-            assert_eq!(alone[i], errors[i], "{cell:?} in a row of errors");
+        }
+        let columns = [1, 2, 3, 4, 5, 8, 16, 32][random.below(8) as usize].min((side - cell.x) as usize);
+        let mut errors = vec![f32::NAN; columns * (side - cell.y).min(3) as usize];
+        field.errors(cell, columns, &mut errors);
+        for (i, error) in errors.into_iter().enumerate() {
+            let cell = Cell { x: cell.x + (i % columns) as u32, y: cell.y + (i / columns) as u32, ..cell };
+            assert_eq!(error, field.error(cell), "{cell:?} among rows of errors");
         }
         let at = |u: f64, v: f64| Place { face: 0, uv: cell.low_corner().uv + DVec2::new(u, v) * cell.side() };
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].map(|(u, v)| field.height(at(u, v)));
@@ -100,17 +105,19 @@ fn check(field: &dyn HeightField, finest: u8, cells: usize, random: &mut Random)
         let places: Vec<Place> = (0..25).map(|i| at(f64::from(i % 5) / 4.0, f64::from(i / 5) / 4.0)).collect();
         let mut bulk = [0.0; 25];
         field.heights(&places, &mut bulk);
-        // Points of the lattice: the corners alone, and with what lies between.
+        // Points of the lattice: the corners alone, with what lies between, and again and again.
         let points: Vec<[u32; 2]> =
             places.iter().map(|p| (p.uv * f64::from(1u32 << 30)).as_uvec2().to_array()).collect();
         let on_lattice = |i: &usize| glam::UVec2::from(points[*i]).as_dvec2() == places[*i].uv * f64::from(1u32 << 30);
-        for some in [vec![0, 4, 20, 24], (0..25).collect::<Vec<usize>>()] {
+        for some in [vec![0, 4, 20, 24], (0..25).collect(), (0..200).map(|i| i * 7 % 25).collect::<Vec<usize>>()] {
             let some: Vec<usize> = some.into_iter().filter(on_lattice).collect();
-            let mut heights = vec![0.0; some.len()];
-            field.lattice(0, &some.iter().map(|&i| points[i]).collect::<Vec<_>>(), &mut heights);
-            for (&i, height) in some.iter().zip(&heights) {
+            let mut vertices = Vec::new();
+            field.raise(3, &some.iter().map(|&i| points[i]).collect::<Vec<_>>(), &mut vertices);
+            assert_eq!(vertices.len(), some.len());
+            for (&i, vertex) in some.iter().zip(&vertices) {
                 let canonical = |h: f32| if h.is_nan() { f32::NAN.to_bits() } else { h.to_bits() };
-                assert_eq!(canonical(*height), canonical(bulk[i]), "{:?} of the lattice", points[i]);
+                assert_eq!(([vertex.x, vertex.y], vertex.face), (points[i], 3));
+                assert_eq!(canonical(vertex.height), canonical(bulk[i]), "{:?} of the lattice", points[i]);
             }
         }
         for (i, place) in places.iter().enumerate() {

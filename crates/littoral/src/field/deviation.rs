@@ -32,6 +32,19 @@ struct CellBounds {
     bounds: Vec<f32>,
 }
 
+impl CellBounds {
+    /// Copies rows of so many bounds, from the first of `bounds` on.
+    fn copy<const COLUMNS: usize>(&self, bounds: &[f32], errors: &mut [f32]) -> bool {
+        for (errors, bounds) in errors.as_chunks_mut::<COLUMNS>().0.iter_mut().zip(bounds.chunks(self.columns)) {
+            if let Some((row, next)) = bounds.split_first_chunk() {
+                *errors = *row;
+                ask_for(next, COLUMNS);
+            }
+        }
+        true
+    }
+}
+
 /// Up to this many patches a side an edited cell is measured anew; larger ones only grow, unless a corner moved or there
 /// are voids.
 const REMEASURED_SIDE: usize = 64;
@@ -73,6 +86,29 @@ impl ErrorPyramid {
         }
     }
 
+    /// The same for cells in rows of so many `columns`, `first` being the south-western one, each a square of several patches; `false` if they are smaller.
+    pub(super) fn rows(&self, first: Cell, columns: usize, errors: &mut [f32]) -> bool {
+        let Some(k) = self.finest.checked_sub(first.level).filter(|&k| k > 0) else { return false };
+        let level = &self.levels[usize::from(k) - 1];
+        let (column, row) = (first.x as usize, first.y as usize);
+        if column + columns <= level.columns && row + errors.len() / columns <= level.rows {
+            let bounds = &level.bounds[row * level.columns + column..];
+            // Rows of these lengths are copied without a call for each.
+            match columns {
+                2 => return level.copy::<2>(bounds, errors),
+                4 => return level.copy::<4>(bounds, errors),
+                8 => return level.copy::<8>(bounds, errors),
+                16 => return level.copy::<16>(bounds, errors),
+                32 => return level.copy::<32>(bounds, errors),
+                _ => (),
+            }
+        }
+        for (j, errors) in errors.chunks_mut(columns).enumerate() {
+            self.row(Cell { y: first.y + j as u32, ..first }, errors);
+        }
+        true
+    }
+
     /// The same for cells in a row, `first` being the westernmost, each a square of several patches; `false` if they are smaller.
     pub(super) fn row(&self, first: Cell, errors: &mut [f32]) -> bool {
         let Some(k) = self.finest.checked_sub(first.level).filter(|&k| k > 0) else { return false };
@@ -81,7 +117,9 @@ impl ErrorPyramid {
         let inside = if row < level.rows { level.columns.saturating_sub(column).min(errors.len()) } else { 0 };
         let (within, beyond) = errors.split_at_mut(inside);
         if inside > 0 {
-            within.copy_from_slice(&level.bounds[row * level.columns + column..][..inside]);
+            let bounds = &level.bounds[row * level.columns + column..];
+            within.copy_from_slice(&bounds[..inside]);
+            ask_for(&bounds[inside..], inside);
         }
         beyond.fill(0.0);
         true
@@ -177,6 +215,18 @@ impl ErrorPyramid {
         };
         own.max(self.children(raster, k, x, y))
     }
+}
+
+/// Asks for the next numbers of a row, which who looked at those before looks at next.
+fn ask_for(next: &[f32], count: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for number in next[..count.min(next.len())].chunks(16).filter_map(|line| line.last()) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: neither reads nor writes.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(number).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (next, count);
 }
 
 enum Coverage {

@@ -5,7 +5,7 @@
 //! every cell's corners lie on samples; the padding is void and never shows.
 
 use super::deviation::{quarter_twist, quarter_twists};
-use super::lattice::Samples;
+use super::lattice::{Samples, Vertex};
 use super::pyramid::window_range;
 use super::{ErrorPyramid, HeightField, HeightRange, RangePyramid, Raster, Window};
 use crate::space::{Cell, Datum, Place};
@@ -279,35 +279,39 @@ impl HeightField for Land {
         }
     }
 
-    fn errors(&self, first: Cell, errors: &mut [f32]) {
+    fn errors(&self, first: Cell, columns: usize, errors: &mut [f32]) {
         let pyramid = self.errors.get_or_init(|| ErrorPyramid::build(&self.raster, self.finest));
-        if pyramid.row(first, errors) {
+        if pyramid.rows(first, columns, errors) {
             return;
         }
-        if first.level == self.finest && !self.raster.voids().any() {
-            self.patch_errors(first.x as usize, first.y as usize, errors);
-        } else {
+        let patches = first.level == self.finest && !self.raster.voids().any();
+        for (j, errors) in errors.chunks_mut(columns).enumerate() {
+            let first = Cell { y: first.y + j as u32, ..first };
+            if patches {
+                self.patch_errors(first.x as usize, first.y as usize, errors);
+                continue;
+            }
             for (i, error) in errors.iter_mut().enumerate() {
                 *error = pyramid.error(&self.raster, Cell { x: first.x + i as u32, ..first });
             }
         }
     }
 
-    fn lattice(&self, _: u8, points: &[[u32; 2]], heights: &mut [f32]) {
-        assert_eq!(points.len(), heights.len(), "expected as many heights as points");
+    fn raise(&self, face: u8, points: &[[u32; 2]], vertices: &mut Vec<Vertex>) {
         let samples = Samples {
             heights: self.raster.heights(),
             columns: self.raster.columns(),
             rows: self.raster.rows(),
             shift: u32::from(Cell::MAX_LEVEL - self.finest),
         };
-        if self.raster.voids().any() || !samples.read(points, heights) {
-            let steps = f64::exp2(-f64::from(Cell::MAX_LEVEL - self.finest));
-            for (height, &[x, y]) in heights.iter_mut().zip(points) {
-                let at = DVec2::new(f64::from(x), f64::from(y)) * steps;
-                *height = self.height_at_lattice(at).unwrap_or(f32::NAN);
-            }
+        if !self.raster.voids().any() && samples.raise(face.into(), points, vertices) {
+            return;
         }
+        let steps = f64::exp2(-f64::from(Cell::MAX_LEVEL - self.finest));
+        vertices.extend(points.iter().map(|&[x, y]| {
+            let at = DVec2::new(f64::from(x), f64::from(y)) * steps;
+            Vertex { x, y, face: face.into(), height: self.height_at_lattice(at).unwrap_or(f32::NAN) }
+        }));
     }
 
     fn heights(&self, places: &[Place], heights: &mut [f32]) {

@@ -20,6 +20,7 @@ pub(crate) use blocks::{BLOCK_LEVELS, Block};
 pub use deviation::ErrorPyramid;
 pub use lakes::{Filled, InLake, LakeError, Lakes, Outlet};
 pub use land::Land;
+pub use lattice::Vertex;
 pub use pyramid::RangePyramid;
 pub use raster::{Raster, RasterError, VoidMask, Window};
 pub use sea::{Finest, Sea, Surface};
@@ -98,10 +99,15 @@ pub trait HeightField: Sync {
         }
     }
 
-    /// Errors of cells in a row, `first` being the westernmost. Overridden where bulk is faster.
-    fn errors(&self, first: Cell, errors: &mut [f32]) {
-        for (i, error) in errors.iter_mut().enumerate() {
-            *error = self.error(Cell { x: first.x + i as u32, ..first });
+    /// Errors of cells in rows of so many `columns`, `first` being the south-western one, row by row northward. Overridden where bulk is faster.
+    ///
+    /// # Panics
+    /// If `columns` is 0.
+    fn errors(&self, first: Cell, columns: usize, errors: &mut [f32]) {
+        for (j, row) in errors.chunks_mut(columns).enumerate() {
+            for (i, error) in row.iter_mut().enumerate() {
+                *error = self.error(Cell { x: first.x + i as u32, y: first.y + j as u32, ..first });
+            }
         }
     }
 
@@ -132,21 +138,35 @@ pub trait HeightField: Sync {
         }
     }
 
-    /// Heights at points of a face's lattice, 2³⁰ steps a side; NaN where void. Overridden where bulk is faster.
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    fn lattice(&self, face: u8, points: &[[u32; 2]], heights: &mut [f32]) {
-        assert_eq!(points.len(), heights.len(), "expected as many heights as points");
+    /// Adds vertices at points of a face's lattice, 2³⁰ steps a side, with the heights there. Overridden where bulk is faster.
+    fn raise(&self, face: u8, points: &[[u32; 2]], vertices: &mut Vec<Vertex>) {
+        // The same points come again, as strips have their neighbours' vertices, and heights are dear: the last ones are remembered.
         const SOME: usize = 64;
-        let mut places = [Place { face, uv: DVec2::ZERO }; SOME];
+        const SLOTS: usize = 1024;
+        let mut seen = [([u32::MAX; 2], 0); SLOTS];
+        let (mut places, mut heights) = ([Place { face, uv: DVec2::ZERO }; SOME], [0.0; SOME]);
+        let (mut asked, mut again) = ([0; SOME], [(0, 0); SOME]);
         let step = f64::exp2(-f64::from(Cell::MAX_LEVEL));
-        for (points, heights) in points.chunks(SOME).zip(heights.chunks_mut(SOME)) {
-            let places = &mut places[..points.len()];
-            for (place, &[x, y]) in places.iter_mut().zip(points) {
-                place.uv = DVec2::new(f64::from(x), f64::from(y)) * step;
+        for points in points.chunks(SOME) {
+            let (mut new, mut known) = (0, 0);
+            for &[x, y] in points {
+                let at = vertices.len();
+                vertices.push(Vertex { x, y, face: face.into(), height: f32::NAN });
+                let key = (u64::from(x) << 32 | u64::from(y)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                let slot = &mut seen[(key >> 54) as usize % SLOTS];
+                if slot.0 == [x, y] {
+                    again[known] = (at, slot.1);
+                    known += 1;
+                    continue;
+                }
+                *slot = ([x, y], at);
+                places[new].uv = DVec2::new(f64::from(x), f64::from(y)) * step;
+                asked[new] = at;
+                new += 1;
             }
-            self.heights(places, heights);
+            self.heights(&places[..new], &mut heights[..new]);
+            asked[..new].iter().zip(&heights).for_each(|(&at, &height)| vertices[at].height = height);
+            again[..known].iter().for_each(|&(at, before)| vertices[at].height = vertices[before].height);
         }
     }
 }

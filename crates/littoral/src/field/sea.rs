@@ -424,10 +424,10 @@ impl HeightField for Sea {
 
     fn row(&self, first: Cell, ranges: &mut [HeightRange], errors: &mut [f32]) {
         ranges.fill(self.range(first));
-        self.errors(first, errors);
+        self.errors(first, errors.len().max(1), errors);
     }
 
-    fn errors(&self, first: Cell, errors: &mut [f32]) {
+    fn errors(&self, first: Cell, _: usize, errors: &mut [f32]) {
         errors.fill(self.error(first));
     }
 

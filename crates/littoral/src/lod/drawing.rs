@@ -1,37 +1,12 @@
 //! What methods put out: patches of one stencil, or a mesh of their own.
 
 use crate::field::HeightField;
+pub use crate::field::Vertex;
 use crate::space::{Cell, Datum, Place};
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, Vec3};
 
 /// Steps of the lattice along a face's side.
 pub(super) const STEPS: u32 = 1 << Cell::MAX_LEVEL;
-
-/// A vertex: a point of a face's lattice and the height it is drawn at. Sixteen bytes, as a GPU takes them.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Vertex {
-    /// Steps from the face's western side, in [0, 2³⁰].
-    pub x: u32,
-    /// Steps from its southern side, in [0, 2³⁰].
-    pub y: u32,
-    /// Which face.
-    pub face: u32,
-    /// Height above the datum (m). NaN where the surface is void; no triangle uses such a vertex.
-    pub height: f32,
-}
-
-impl Vertex {
-    /// The place it lies at.
-    pub fn place(&self) -> Place {
-        place(self.face as u8, [self.x, self.y])
-    }
-
-    /// Where it is in the world (m).
-    pub fn world(&self, datum: &Datum) -> DVec3 {
-        datum.world(self.place(), f64::from(self.height)).0
-    }
-}
 
 /// The place of a lattice point.
 pub(super) fn place(face: u8, at: [u32; 2]) -> Place {

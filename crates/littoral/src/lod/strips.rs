@@ -19,11 +19,11 @@ use super::{Drawing, Limits, Lod, Reached, ScreenMetric, ViewError};
 use crate::field::HeightField;
 use crate::space::{Cell, Datum, View};
 use glam::DVec2;
-use multiversion::multiversion;
-use page::{Asked, DEPTH, Page, SEAMS, halve};
+use page::{Asked, DEPTH, Page, SEAMS, SIDE, UNKNOWN, halve};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
-use walk::{Beyond, Rows, Trail, Walk};
+use stage::Rows;
+use walk::{Beyond, Trail, Walk, Way};
 
 /// Strips of triangles, page by page.
 #[derive(Clone, Debug)]
@@ -48,12 +48,21 @@ struct Tier {
     index: FxHashMap<[u32; 2], u32>,
     /// Pages by how doubtful their bounds are (pixels).
     doubts: Vec<(f32, usize)>,
+    /// The last level of which anything is cut, page by page, while neighbours cut each other.
+    lasts: Vec<u8>,
 }
+
+/// Sides of a page, and which is beyond them.
+const SOUTH: usize = 0;
+const EAST: usize = 1;
+const NORTH: usize = 2;
+const WEST: usize = 3;
+const BESIDE: [(i32, i32); 4] = [(0, -1), (1, 0), (0, 1), (-1, 0)];
 
 /// What a walk brings home.
 #[derive(Clone, Debug, Default)]
 struct Walked {
-    rows: Rows,
+    way: Way,
     trail: Trail,
     vertices: Vec<Vertex>,
     ends: Vec<u32>,
@@ -61,6 +70,9 @@ struct Walked {
 
 /// Pages fewer than these are not worth other threads.
 const FEW: usize = 64;
+
+/// One page of so many is asked first where there may be too many triangles.
+const SOME: usize = 16;
 
 impl Tier {
     fn clear(&mut self, depth: u8) {
@@ -99,23 +111,32 @@ impl Tier {
         let pages = self.pages().iter().enumerate();
         doubts.extend(pages.filter(|(_, page)| page.doubt > worst).map(|(number, page)| (page.doubt, number)));
         doubts.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut rows = Rows::default();
         for &(doubt, number) in &doubts {
             if doubt <= worst {
                 break;
             }
-            worst = self.pages[number].resolve(asked).max(worst);
+            worst = self.pages[number].resolve(asked, &mut rows).max(worst);
         }
         self.doubts = doubts;
         worst
     }
 
     /// Does something with every page, on several threads if there are many.
-    fn each<T: Send>(&mut self, work: impl Fn(&mut Page) -> T + Sync + Send, join: fn(T, T) -> T) -> Option<T> {
+    fn each<T: Send>(
+        &mut self,
+        work: impl Fn(&mut Page, &mut Rows) -> T + Sync + Send,
+        join: fn(T, T) -> T,
+    ) -> Option<T> {
+        let some = |pages: &mut [Page]| {
+            let mut rows = Rows::default();
+            pages.iter_mut().map(|page| work(page, &mut rows)).reduce(join)
+        };
         let pages = &mut self.pages[..self.used];
-        if pages.len() < FEW {
-            pages.iter_mut().map(work).reduce(join)
+        if pages.len() < FEW || rayon::current_num_threads() == 1 {
+            some(pages)
         } else {
-            pages.par_iter_mut().map(work).reduce_with(join)
+            pages.par_chunks_mut(FEW / 4).filter_map(some).reduce_with(join)
         }
     }
 }
@@ -135,7 +156,7 @@ impl Strips {
         tolerance: f32,
     ) -> Result<(f32, usize), usize> {
         let finest = self.limits.finest.min(Cell::MAX_LEVEL);
-        let asked = Asked { field, metric, tolerance, finest };
+        let asked = Asked::new(field, metric, tolerance, finest);
         // Pages end at the finest level; the first takes what is left above them.
         let tiers = usize::from(finest.div_ceil(DEPTH));
         self.tiers.resize_with(tiers, Tier::default);
@@ -154,10 +175,24 @@ impl Strips {
         for i in 0..tiers {
             let (coarse, fine) = self.tiers.split_at_mut(i + 1);
             let tier = &mut coarse[i];
-            worst = tier.each(|page| page.refine(&asked), f32::max).map_or(worst, |bound| bound.max(worst));
-            worst = tier.resolve(&asked, worst);
-            leaves += tier.pages().iter().map(Page::count).sum::<usize>();
-            let pages = tier.pages().iter().map(Page::below).sum::<usize>();
+            let refine = |page: &mut Page, rows: &mut Rows| {
+                let bound = page.refine(&asked, rows);
+                (bound, page.count(), page.below())
+            };
+            let join = |a: (f32, usize, usize), b: (f32, usize, usize)| (a.0.max(b.0), a.1 + b.1, a.2 + b.2);
+            // What is far too much is known from a part of the pages.
+            if tier.used * SIDE * SIDE * 2 > self.limits.triangles && tier.used > SOME * FEW {
+                let mut rows = Rows::default();
+                let some = tier.pages[..tier.used].iter_mut().skip(SOME / 2).step_by(SOME);
+                let some = some.map(|page| refine(page, &mut rows)).reduce(join).unwrap_or_default();
+                let about = leaves + SOME * (some.1 + 3 * some.2);
+                if about > most / 8 * 10 {
+                    return Err(about);
+                }
+            }
+            let (bound, drawn, pages) = tier.each(refine, join).unwrap_or_default();
+            worst = tier.resolve(&asked, bound.max(worst));
+            leaves += drawn;
             if leaves + 3 * pages > most {
                 return Err(leaves + 3 * pages);
             }
@@ -168,8 +203,8 @@ impl Strips {
         self.balance();
         let mut cells = 0;
         for tier in &mut self.tiers {
-            let settle = |page: &mut Page| {
-                page.settle(&asked);
+            let settle = |page: &mut Page, rows: &mut Rows| {
+                page.settle(&asked, rows);
                 page.count()
             };
             cells += tier.each(settle, |a, b| a + b).unwrap_or(0);
@@ -180,34 +215,39 @@ impl Strips {
     /// Refines as far as the tolerance asks and the limits allow; the bound reached (pixels).
     fn fit(&mut self, field: &dyn HeightField, metric: &ScreenMetric) -> f32 {
         let most = self.limits.triangles.max(8);
-        let mut least = metric.tolerance();
-        let mut fits = least;
-        let (mut pixels, mut cells) = loop {
-            match self.refine(field, metric, fits) {
-                Ok(reached) => break reached,
+        // Most of what is allowed: a guess that is meant to fit should not just fail to.
+        let aim = most as f64 * 0.94;
+        // The finest bound that is known to be too fine and the coarsest one that fits, with the triangles they take.
+        let (mut fine, mut fits) = (None::<(f64, f64)>, None::<(f64, f64)>);
+        let (mut guess, mut reached, mut stands) = (f64::from(metric.tolerance()), 0.0, true);
+        for tries in 0.. {
+            match self.refine(field, metric, guess as f32) {
+                Ok((pixels, cells)) => {
+                    fits = Some((guess, 2.0 * cells.max(1) as f64));
+                    (reached, stands) = (pixels, true);
+                }
                 Err(cells) => {
-                    // Triangles are about as many as the inverse of the bound.
-                    least = fits;
-                    fits *= (2.0 * cells as f32 / most as f32).powf(0.7).clamp(1.1, 10.0);
+                    fine = Some((guess, 2.0 * cells.max(1) as f64));
+                    stands = false;
                 }
             }
-        };
-        // Not much of what is allowed is left over.
-        let mut stands = true;
-        for _ in 0..4 {
-            if fits == least || 2 * cells >= most / 8 * 7 {
-                break;
-            }
-            let middle = (least * fits).sqrt();
-            match self.refine(field, metric, middle) {
-                Ok(reached) => ((pixels, cells), fits, stands) = (reached, middle, true),
-                Err(_) => (least, stands) = (middle, false),
-            }
+            // Between two bounds triangles are about a power of the bound; from one they are guessed to be as its inverse, or somewhat steeper.
+            guess = match (fine, fits) {
+                (None, _) => return reached,
+                (Some((bound, count)), None) => bound * (count / aim).powf(0.7).clamp(1.05, 10.0),
+                (Some(fine), Some(fits)) => {
+                    if fits.1 >= most as f64 * 0.875 || tries > 8 || fits.0 < fine.0 * 1.001 {
+                        break;
+                    }
+                    let share = (fine.1.max(aim * 1.01) / aim).ln() / (fine.1.max(aim * 1.01) / fits.1).ln();
+                    fine.0 * (fits.0 / fine.0).powf(share.clamp(0.1, 0.9))
+                }
+            };
         }
-        if !stands {
-            _ = self.refine(field, metric, fits);
+        if let (false, Some((bound, _))) = (stands, fits) {
+            _ = self.refine(field, metric, bound as f32);
         }
-        pixels
+        reached
     }
 
     /// Cuts more until neighbours differ by one level at most.
@@ -225,10 +265,15 @@ impl Strips {
                     tier.page(above).mark(up, y & mask, 1 << (x & mask));
                 }
             }
+            let Tier { pages, used, lasts, .. } = tier;
+            lasts.clear();
+            lasts.extend(pages[..*used].iter().map(|page| page.last));
             for level in (1..=tier.depth).rev() {
                 let mut number = 0;
                 while number < tier.used {
-                    tier.grow(number, level);
+                    if tier.lasts[number] >= level {
+                        tier.grow(number, level);
+                    }
                     number += 1;
                 }
             }
@@ -257,9 +302,6 @@ impl Tier {
         let cell = self.pages[number].cell;
         let cells = 1u32 << cell.level;
         let half = side / 2;
-        if self.pages[number].last < level {
-            return;
-        }
         // Rows with a cut cell at the western and at the eastern side.
         let (mut western, mut eastern) = (0, 0);
         for y in 0..side {
@@ -273,20 +315,38 @@ impl Tier {
                 page.mark(level - 1, beyond >> 1, halve(bits));
             }
             if y == 0 && cell.y > 0 {
-                self.page(Cell { y: cell.y - 1, ..cell }).mark(level - 1, half - 1, halve(bits));
+                self.mark(number, SOUTH, level - 1, half - 1, halve(bits));
             }
             if y == side - 1 && cell.y + 1 < cells {
-                self.page(Cell { y: cell.y + 1, ..cell }).mark(level - 1, 0, halve(bits));
+                self.mark(number, NORTH, level - 1, 0, halve(bits));
             }
             western |= (bits & 1) << y;
             eastern |= (bits >> (side - 1) & 1) << y;
         }
-        let west = cell.x.checked_sub(1).map(|x| (x, western, half - 1));
-        let east = Some((cell.x + 1, eastern, 0)).filter(|&(x, ..)| x < cells);
-        for (x, rows, column) in [west, east].into_iter().flatten().filter(|&(_, rows, _)| rows != 0) {
-            let (beside, rows) = (self.page(Cell { x, ..cell }), halve(rows));
-            (0..half).filter(|y| rows >> y & 1 == 1).for_each(|y| beside.mark(level - 1, y, 1 << column));
+        let west = Some((WEST, western, half - 1)).filter(|_| cell.x > 0);
+        let east = Some((EAST, eastern, 0)).filter(|_| cell.x + 1 < cells);
+        for (side, rows, column) in [west, east].into_iter().flatten().filter(|&(_, rows, _)| rows != 0) {
+            let rows = halve(rows);
+            (0..half).filter(|y| rows >> y & 1 == 1).for_each(|y| self.mark(number, side, level - 1, y, 1 << column));
         }
+    }
+
+    /// Cuts cells of the page beside one, made if it is not there.
+    fn mark(&mut self, number: usize, side: usize, level: u8, y: u32, bits: u64) {
+        let Page { cell, beside, .. } = self.pages[number];
+        let mut other = beside[side] as usize;
+        if beside[side] == UNKNOWN {
+            let (i, j) = BESIDE[side];
+            let (x, y) = (cell.x.wrapping_add_signed(i), cell.y.wrapping_add_signed(j));
+            self.page(Cell { x, y, ..cell });
+            let found = self.index[&[x, y]];
+            self.pages[number].beside[side] = found;
+            self.pages[found as usize].beside[(side + 2) % 4] = number as u32;
+            other = found as usize;
+            self.lasts.resize(self.used, 0);
+        }
+        self.pages[other].mark(level, y, bits);
+        self.lasts[other] = self.pages[other].last;
     }
 }
 
@@ -332,7 +392,7 @@ impl Strips {
             if field.error(Cell::face(0)).is_finite() {
                 let corners = [[0, STEPS], [0, 0], [STEPS, STEPS], [STEPS, 0]];
                 drawing.strips.push(4);
-                raise(field, 0, &corners, &mut drawing.mesh.vertices);
+                field.raise(0, &corners, &mut drawing.mesh.vertices);
             }
             return;
         }
@@ -373,16 +433,21 @@ impl Walked {
         vertices: &mut Vec<Vertex>,
         ends: &mut Vec<u32>,
     ) {
-        for &(_, tier, number) in pages {
+        self.trail.clear();
+        for (i, &(_, tier, number)) in pages.iter().enumerate() {
             let face = self.page(tiers, [tier, number].map(|i| i as usize), turned);
+            if !self.trail.is_enough() && i + 1 < pages.len() {
+                continue;
+            }
             let (points, strips) = self.trail.strips();
             let begun = vertices.len() as u32;
             ends.extend(strips.iter().map(|end| begun + end));
-            raise(field, face, points, vertices);
+            field.raise(face, points, vertices);
             for sliver in self.trail.slivers() {
-                raise(field, face, sliver, vertices);
+                field.raise(face, sliver, vertices);
                 ends.push(vertices.len() as u32);
             }
+            self.trail.clear();
         }
     }
 
@@ -390,8 +455,12 @@ impl Walked {
     fn page(&mut self, tiers: &[Tier], [tier, number]: [usize; 2], turned: bool) -> u8 {
         let page = &tiers[tier].pages[number];
         let Cell { x, y, level, face } = page.cell;
-        let beyond = [(0i64, -1i64), (1, 0), (0, 1), (-1, 0)].map(|(i, j)| {
-            let [x, y] = [i64::from(x) + i, i64::from(y) + j];
+        let beyond = [SOUTH, EAST, NORTH, WEST].map(|side| {
+            if page.beside[side] != UNKNOWN {
+                return Beyond { page: Some(&tiers[tier].pages[page.beside[side] as usize]), cell: false };
+            }
+            let (i, j) = BESIDE[side];
+            let [x, y] = [i64::from(x) + i64::from(i), i64::from(y) + i64::from(j)];
             if !(0..1i64 << level).contains(&x) || !(0..1i64 << level).contains(&y) {
                 return Beyond::default();
             }
@@ -405,34 +474,11 @@ impl Walked {
             };
             Beyond { page, cell }
         });
-        self.rows.load(page, beyond, turned);
+        self.way.load(page, &beyond, turned);
         let side = STEPS >> level;
         let corner = [x, y].map(|at| (at + u32::from(turned)) * side);
         let side = if turned { side.wrapping_neg() } else { side };
-        Walk { rows: &self.rows, trail: &mut self.trail, corner, side }.run();
+        Walk { way: &self.way, trail: &mut self.trail, corner, side }.run();
         face
-    }
-}
-
-/// Adds vertices at points of the lattice, with their heights.
-fn raise(field: &dyn HeightField, face: u8, points: &[[u32; 2]], vertices: &mut Vec<Vertex>) {
-    const SOME: usize = 256;
-    let mut heights = [0.0; SOME];
-    let mut some = [Vertex { x: 0, y: 0, face: face.into(), height: 0.0 }; SOME];
-    for points in points.chunks(SOME) {
-        let (heights, some) = (&mut heights[..points.len()], &mut some[..points.len()]);
-        field.lattice(face, points, heights);
-        weave(face.into(), points, bytemuck::cast_slice(heights), bytemuck::cast_slice_mut(some));
-        vertices.extend_from_slice(some);
-    }
-}
-
-/// Puts points and heights together, as the numbers that vertices are.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-fn weave(face: u32, points: &[[u32; 2]], heights: &[u32], vertices: &mut [[u32; 4]]) {
-    let count = vertices.len();
-    let (points, heights) = (&points[..count], &heights[..count]);
-    for i in 0..count {
-        vertices[i] = [points[i][0], points[i][1], face, heights[i]];
     }
 }

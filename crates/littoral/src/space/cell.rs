@@ -56,7 +56,7 @@ impl Cell {
 
     /// Side length in uv: 2^−level.
     pub fn side(self) -> f64 {
-        f64::exp2(-f64::from(self.level))
+        1.0 / (1u64 << self.level) as f64
     }
 
     /// The south-west corner.

@@ -1,6 +1,6 @@
 //! What methods cost beside time: memory, and heights asked for.
 
-use littoral::field::{HeightField, HeightRange};
+use littoral::field::{HeightField, HeightRange, Vertex};
 use littoral::space::{Cell, Datum, Place};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicBool, AtomicIsize, AtomicUsize, Ordering::Relaxed};
@@ -101,8 +101,8 @@ impl HeightField for Counted<'_> {
         self.field.row(first, ranges, errors);
     }
 
-    fn errors(&self, first: Cell, errors: &mut [f32]) {
-        self.field.errors(first, errors);
+    fn errors(&self, first: Cell, columns: usize, errors: &mut [f32]) {
+        self.field.errors(first, columns, errors);
     }
 
     fn fill(&self, cell: Cell, side: usize, heights: &mut [f32]) {
@@ -115,8 +115,8 @@ impl HeightField for Counted<'_> {
         self.field.heights(places, heights);
     }
 
-    fn lattice(&self, face: u8, points: &[[u32; 2]], heights: &mut [f32]) {
+    fn raise(&self, face: u8, points: &[[u32; 2]], vertices: &mut Vec<Vertex>) {
         self.heights.fetch_add(points.len(), Relaxed);
-        self.field.lattice(face, points, heights);
+        self.field.raise(face, points, vertices);
     }
 }

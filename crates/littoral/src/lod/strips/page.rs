@@ -8,8 +8,13 @@
 use super::super::ScreenMetric;
 use super::stage::{Judged, Lens, Rows, Stage, judge, look_near, see};
 use crate::field::{HeightField, HeightRange};
-use crate::space::Cell;
+use crate::space::{Cell, Datum};
+use glam::DVec2;
+use multiversion::multiversion;
 use std::ops::Range;
+
+/// The number of no page.
+pub(super) const UNKNOWN: u32 = u32::MAX;
 
 /// Levels within a page, and its cells along a side.
 pub(super) const DEPTH: u8 = 6;
@@ -24,6 +29,7 @@ pub(super) fn row(level: u8, y: u32) -> usize {
 }
 
 /// A square of the quadtree that is cut, and what becomes of its parts.
+#[repr(C)]
 #[derive(Clone, Debug)]
 pub(super) struct Page {
     /// The square.
@@ -32,6 +38,8 @@ pub(super) struct Page {
     pub depth: u8,
     /// The last level of which anything is cut.
     pub last: u8,
+    /// Pages beside it to the south, east, north and west, once they were looked for.
+    pub beside: [u32; 4],
     /// What is cut; those of the last level are pages of their own.
     pub cut: [u64; ROWS],
     /// What is drawn: while the page is measured, what is whole and may be seen.
@@ -50,9 +58,23 @@ pub(super) struct Asked<'a> {
     pub tolerance: f32,
     /// The level that is not cut.
     pub finest: u8,
+    /// Sides of the face (m), and where the eye stands as a share of them.
+    pub size: DVec2,
+    pub eye: DVec2,
+}
+
+impl<'a> Asked<'a> {
+    pub fn new(field: &'a dyn HeightField, metric: &'a ScreenMetric, tolerance: f32, finest: u8) -> Asked<'a> {
+        let (origin, size) = match field.datum() {
+            Datum::Plane { origin, size } => (origin, size),
+            Datum::Ellipsoid { .. } => (DVec2::ZERO, DVec2::ONE),
+        };
+        Asked { field, metric, tolerance, finest, size, eye: (metric.eye().truncate() - origin) / size }
+    }
 }
 
 /// Bits of the cells in a row, one for two: set where either is.
+#[inline(always)]
 pub(super) fn halve(bits: u64) -> u64 {
     let mut x = (bits | bits >> 1) & 0x5555_5555_5555_5555;
     x = (x | x >> 1) & 0x3333_3333_3333_3333;
@@ -63,6 +85,7 @@ pub(super) fn halve(bits: u64) -> u64 {
 }
 
 /// Bits of the cells in a row, two for one. The upper half of `bits` is lost.
+#[inline(always)]
 pub(super) fn double(bits: u64) -> u64 {
     let mut x = bits & 0xffff_ffff;
     x = (x | x << 16) & 0x0000_ffff_0000_ffff;
@@ -73,10 +96,25 @@ pub(super) fn double(bits: u64) -> u64 {
     x | x << 1
 }
 
+/// The quarters of cells that are cut, two rows for one.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+fn quarter(cut: &[u64], quarters: &mut [u64]) {
+    for (&cut, quarters) in cut.iter().zip(quarters.as_chunks_mut::<2>().0) {
+        *quarters = [double(cut); 2];
+    }
+}
+
+/// How many bits are set in one and not in the other.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512vpopcntdq", "x86_64+popcnt"))]
+fn count(drawn: &[u64], cut: &[u64]) -> usize {
+    drawn.iter().zip(cut).map(|(drawn, cut)| (drawn & !cut).count_ones() as usize).sum()
+}
+
 impl Page {
     /// A page of which only the square itself is cut.
     pub fn of(cell: Cell, depth: u8) -> Page {
-        let mut page = Page { cell, depth, last: 0, cut: [0; ROWS], drawn: [0; ROWS], stage: None, doubt: 0.0 };
+        let (rows, beside) = ([0; ROWS], [UNKNOWN; 4]);
+        let mut page = Page { cell, depth, last: 0, cut: rows, drawn: rows, stage: None, beside, doubt: 0.0 };
         page.cut[0] = 1;
         page
     }
@@ -88,6 +126,7 @@ impl Page {
         self.drawn[rows].fill(0);
         self.cut[0] = 1;
         (self.cell, self.depth, self.last, self.stage, self.doubt) = (cell, depth, 0, None, 0.0);
+        self.beside = [UNKNOWN; 4];
     }
 
     /// The deepest level there are cells of.
@@ -112,13 +151,13 @@ impl Page {
     }
 
     /// Cuts what the bounds ask for; the greatest bound (pixels) of what is left whole, but for what is in doubt.
-    pub fn refine(&mut self, asked: &Asked) -> f32 {
-        let (mut worst, mut most, mut rows) = (0.0f32, 0.0, Rows::default());
+    pub fn refine(&mut self, asked: &Asked, rows: &mut Rows) -> f32 {
+        let (mut worst, mut most) = (0.0f32, 0.0);
         for level in 1..=self.depth {
             if level > self.deepest() {
                 break;
             }
-            self.quarter(level, &mut rows);
+            self.quarter(level, rows);
             let wanted = if self.cell.level + level < asked.finest {
                 Wanted::Cuts
             } else if level > 1 && self.stage(asked).whole {
@@ -128,42 +167,42 @@ impl Page {
             } else {
                 Wanted::Bounds
             };
-            let judged = self.measure(asked, &mut rows, level, wanted);
+            let judged = self.measure(asked, rows, level, wanted);
             (worst, most) = (judged.worst.max(worst), judged.most);
         }
         worst
     }
 
     /// The greatest bound (pixels) of what was in doubt.
-    pub fn resolve(&mut self, asked: &Asked) -> f32 {
-        let mut rows = Rows::default();
-        self.quarter(self.depth, &mut rows);
-        self.measure(asked, &mut rows, self.depth, Wanted::Bounds).worst
+    pub fn resolve(&mut self, asked: &Asked, rows: &mut Rows) -> f32 {
+        self.quarter(self.depth, rows);
+        self.measure(asked, rows, self.depth, Wanted::Bounds).worst
     }
 
     fn quarter(&self, level: u8, rows: &mut Rows) {
-        (0..1u32 << level).for_each(|y| rows.cells[y as usize] = self.quarters(level, y));
+        let side = 1usize << level;
+        quarter(&self.cut[row(level - 1, 0)..][..side / 2], &mut rows.cells[..side]);
     }
 
     /// Says what is drawn, after neighbours cut what they had to.
-    pub fn settle(&mut self, asked: &Asked) {
+    pub fn settle(&mut self, asked: &Asked, rows: &mut Rows) {
         if self.stage(asked).is_all_seen() {
             for level in 1..=self.deepest() {
-                for y in 0..1u32 << level {
-                    let at = row(level, y);
-                    self.drawn[at] = self.quarters(level, y) & !self.cut[at];
-                }
+                let side = 1usize << level;
+                let at = row(level, 0);
+                let (before, cut) = self.cut.split_at(at);
+                quarter(&before[at - side / 2..], &mut self.drawn[at..at + side]);
+                self.drawn[at..at + side].iter_mut().zip(cut).for_each(|(drawn, cut)| *drawn &= !cut);
             }
             return;
         }
-        let mut rows = Rows::default();
         for level in 1..=self.deepest() {
             for y in 0..1u32 << level {
                 // What was measured and is not seen is measured again: that is little.
                 let at = row(level, y);
                 rows.cells[y as usize] = self.quarters(level, y) & !self.cut[at] & !self.drawn[at];
             }
-            self.measure(asked, &mut rows, level, Wanted::Sight);
+            self.measure(asked, rows, level, Wanted::Sight);
         }
         let rows = self.rows();
         self.drawn[rows.clone()].iter_mut().zip(&self.cut[rows]).for_each(|(drawn, cut)| *drawn &= !cut);
@@ -172,11 +211,7 @@ impl Page {
     /// How many cells are drawn.
     pub fn count(&self) -> usize {
         let rows = self.rows();
-        self.drawn[rows.clone()]
-            .iter()
-            .zip(&self.cut[rows])
-            .map(|(drawn, cut)| (drawn & !cut).count_ones() as usize)
-            .sum()
+        count(&self.drawn[rows.clone()], &self.cut[rows])
     }
 
     /// How many of its cells are pages.
@@ -192,23 +227,25 @@ impl Page {
     fn measure(&mut self, asked: &Asked, rows: &mut Rows, level: u8, wanted: Wanted) -> Judged {
         let side = 1usize << level;
         let stage = self.stage(asked);
-        for y in 0..side {
-            rows.whole[y] = u64::MAX;
+        rows.whole[..side].fill(u64::MAX);
+        if !stage.whole {
+            rows.room(level);
+        } else if wanted != Wanted::Sight {
+            rows.ask(asked, self.at(level, 0, 0), level);
+        }
+        for y in 0..if stage.whole { 0 } else { side } {
             let bits = rows.cells[y];
-            if bits == 0 || stage.whole && wanted == Wanted::Sight {
+            if bits == 0 {
                 continue;
             }
             let columns = bits.trailing_zeros() as usize..64 - bits.leading_zeros() as usize;
             let first = self.at(level, columns.start as u32, y as u32);
-            let errors = &mut rows.errors[y][columns.clone()];
-            if stage.whole {
-                asked.field.errors(first, errors);
-                continue;
-            }
+            let errors = rows.errors(columns.clone(), y);
             let mut ranges = [HeightRange::EMPTY; SIDE];
             asked.field.row(first, &mut ranges[..columns.len()], errors);
             let bit = |on: bool, i: usize| u64::from(on) << i;
-            rows.whole[y] = columns.clone().zip(&*errors).fold(0, |bits, (i, error)| bits | bit(error.is_finite(), i));
+            let whole = columns.clone().zip(&*errors).fold(0, |bits, (i, error)| bits | bit(error.is_finite(), i));
+            rows.whole[y] = whole;
             rows.cells[y] &= columns.zip(ranges).fold(0, |bits, (i, range)| bits | bit(!range.is_empty(), i));
         }
         let lens = Lens::new(asked, self.at(level, 0, 0), level, wanted == Wanted::Cuts);
@@ -218,7 +255,7 @@ impl Page {
             see(&lens, &stage, rows);
         }
         let mut judged = if stage.near {
-            look_near(asked, &lens, self.at(level, 0, 0), wanted != Wanted::Sight, rows)
+            look_near(asked, &lens, &stage, self.at(level, 0, 0), wanted != Wanted::Sight, rows)
         } else if wanted == Wanted::Sight {
             rows.above.fill(0);
             Judged::default()
@@ -311,10 +348,11 @@ mod tests {
             let view = View::looking_at(eye, middle.extend(2.0), 0.8, UVec2::new(320, 200));
             let metric = ScreenMetric::new(&view, land.datum()).expect("a view");
             for (cell, depth, finest) in [(Cell::face(0), 6, 7), (Cell { level: 1, x: 1, y: 0, face: 0 }, 6, 7)] {
-                let asked = Asked { field: land, metric: &metric, tolerance, finest };
+                let asked = Asked::new(land, &metric, tolerance, finest);
+                let mut rows = Rows::default();
                 let mut page = Page::of(cell, depth);
-                let worst = page.refine(&asked);
-                let told = if page.doubt > worst { page.resolve(&asked).max(worst) } else { worst };
+                let worst = page.refine(&asked, &mut rows);
+                let told = if page.doubt > worst { page.resolve(&asked, &mut rows).max(worst) } else { worst };
                 let mut most = 0.0f32;
                 for (level, y) in (1..=page.deepest()).flat_map(|level| (0..1 << level).map(move |y| (level, y))) {
                     for x in (0..1u32 << level).filter(|x| page.quarters(level, y) >> x & 1 == 1) {

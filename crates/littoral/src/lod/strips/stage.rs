@@ -1,14 +1,19 @@
 //! Pages before the eye: which of their cells may be seen, and how far off they would be drawn.
 //!
-//! How near and how visible a cell is is a matter of its place and of the slab of heights about it. Columns are worked out once for a level, slabs once for its
-//! rows within a block, and what is left for each row are a root and a quotient for sixteen cells at once.
+//! How near and how visible a cell is is a matter of its place and of the slab of heights about it. Columns are worked out once for a level, slabs once for
+//! a page, and what is left are a few products for sixteen cells at once: bounds are compared by their squares, without roots and quotients.
+
+mod judge;
+
+pub(super) use judge::judge;
 
 use super::super::metric::Bounds;
 use super::page::{Asked, SEAMS, SIDE};
 use crate::field::HeightRange;
-use crate::space::{Cell, Datum, View};
+use crate::space::{Cell, View};
 use glam::{DVec2, Vec3};
 use multiversion::multiversion;
+use std::ops::Range;
 
 /// Bounds of seen and whole cells (pixels).
 #[derive(Default)]
@@ -25,7 +30,10 @@ pub(super) struct Rows {
     pub cells: [u64; SIDE],
     /// What has a finite error.
     pub whole: [u64; SIDE],
-    pub errors: [[f32; SIDE]; SIDE],
+    /// Errors (m) row by row of a part of the level: its first column and row, and how many columns it has.
+    errors: [f32; SIDE * SIDE],
+    corner: [usize; 2],
+    columns: usize,
     /// What may be seen, and what has a bound above what was asked.
     pub seen: [u64; SIDE],
     pub above: [u64; SIDE],
@@ -33,8 +41,55 @@ pub(super) struct Rows {
 
 impl Default for Rows {
     fn default() -> Rows {
-        let (cells, errors) = ([0; SIDE], [[0.0; SIDE]; SIDE]);
-        Rows { cells, whole: cells, errors, seen: cells, above: cells }
+        let cells = [0; SIDE];
+        Rows {
+            cells,
+            whole: cells,
+            errors: [0.0; SIDE * SIDE],
+            corner: [0; 2],
+            columns: SIDE,
+            seen: cells,
+            above: cells,
+        }
+    }
+}
+
+impl Rows {
+    /// Asks for the errors of all cells, of which `first` is the level's first: of more than are wanted, but at once.
+    pub fn ask(&mut self, asked: &Asked, first: Cell, level: u8) {
+        let side = 1usize << level;
+        let all = self.cells[..side].iter().fold(0, |all, bits| all | bits);
+        self.room(level);
+        if all == 0 {
+            return;
+        }
+        let mut rows = 0..side;
+        if side > LANES {
+            let (west, east) = (all.trailing_zeros() as usize / LANES, 64 - all.leading_zeros() as usize);
+            rows = self.cells[..side].iter().position(|&bits| bits != 0).unwrap_or(0)
+                ..self.cells[..side].iter().rposition(|&bits| bits != 0).map_or(0, |y| y + 1);
+            self.corner = [west * LANES, rows.start];
+            self.columns = (east.div_ceil(LANES) - west) * LANES;
+        }
+        let first = Cell { x: first.x + self.corner[0] as u32, y: first.y + self.corner[1] as u32, ..first };
+        asked.field.errors(first, self.columns, &mut self.errors[..rows.len() * self.columns]);
+    }
+
+    /// Makes room for errors of all cells.
+    pub fn room(&mut self, level: u8) {
+        (self.corner, self.columns) = ([0; 2], 1 << level);
+    }
+
+    /// Where the errors of a row are from a column on.
+    #[inline(always)]
+    fn index(&self, x: usize, y: usize) -> usize {
+        (y - self.corner[1]) * self.columns + x - self.corner[0]
+    }
+
+    /// The errors of a row's columns.
+    pub fn errors(&mut self, columns: Range<usize>, y: usize) -> &mut [f32] {
+        let at = self.index(columns.start, y);
+        &mut self.errors[at..at + columns.len()]
     }
 }
 
@@ -49,10 +104,13 @@ pub(super) struct Stage {
     slabs: [[HeightRange; ACROSS]; ACROSS],
     /// Those of all.
     slab: HeightRange,
+    /// How far the blocks' heights are ahead of the eye at least (m), and last those of all.
+    down: [f32; ACROSS * ACROSS + 1],
     /// Whether no part of it is void.
     pub whole: bool,
-    /// Whether all of it lies within the frame.
+    /// Whether all of it lies within the frame, and which of the frame's planes it crosses.
     pub inside: bool,
+    crossed: [bool; 5],
     /// Whether the eye is nearer than its heights differ: then each cell is judged by its own heights, not by those of blocks.
     pub near: bool,
     /// What rounding may take from lengths (m).
@@ -63,6 +121,14 @@ impl Stage {
     /// Whether all of its cells are whole and within the frame.
     pub fn is_all_seen(&self) -> bool {
         self.whole && self.inside
+    }
+
+    /// Which of [`Stage::down`] is that of a cell.
+    fn block(&self, level: u8, x: usize, y: usize) -> usize {
+        match level.checked_sub(BLOCKS) {
+            Some(block) => (y >> block) * ACROSS + (x >> block),
+            None => ACROSS * ACROSS,
+        }
     }
 
     pub fn new(asked: &Asked, page: Cell, depth: u8) -> Stage {
@@ -82,16 +148,26 @@ impl Stage {
                 asked.field.row(first, &mut ranges[part.clone()], &mut errors[part.clone()]);
             }
         }
+        // Three in a row, then three of these in a column.
+        let both = |a: HeightRange, b: HeightRange| HeightRange {
+            low: if a.low < b.low { a.low } else { b.low },
+            high: if a.high > b.high { a.high } else { b.high },
+        };
+        let mut threes = [[HeightRange::EMPTY; ACROSS]; ACROSS + 2];
+        for (threes, ranges) in threes.iter_mut().zip(&ranges) {
+            for (x, three) in threes.iter_mut().enumerate() {
+                *three = both(both(ranges[x], ranges[x + 1]), ranges[x + 2]);
+            }
+        }
         let mut slabs = [[HeightRange::EMPTY; ACROSS]; ACROSS];
         let mut slab = HeightRange::EMPTY;
         let eye = asked.metric.eye().z;
         let blur = eye.abs() as f32 * f32::EPSILON;
         for (y, slabs) in slabs[..across].iter_mut().enumerate() {
             for (x, here) in slabs[..across].iter_mut().enumerate() {
-                let rows = ranges[y..y + 3].iter().flat_map(|row| &row[x..x + 3]);
-                let range = rows.fold(HeightRange::EMPTY, |all, range| all.union(*range));
+                let range = both(both(threes[y][x], threes[y + 1][x]), threes[y + 2][x]);
                 *here = HeightRange { low: range.low - eye as f32 - blur, high: range.high - eye as f32 + blur };
-                slab = slab.union(*here);
+                slab = both(slab, *here);
             }
         }
         // The farthest corner, and a cell beyond.
@@ -102,12 +178,16 @@ impl Stage {
         let least = |[x, y, z]: [f32; 3]| {
             lesser(x, columns[0], columns[1]) + lesser(y, rows[0], rows[1]) + lesser(z, slab.low, slab.high)
         };
-        let inside = lens.sides.iter().all(|&side| least(side) >= slack) && least(lens.forward) >= View::NEAR + slack;
+        let crossed = lens.planes().map(|(plane, beyond)| least(plane) < beyond + slack);
+        let inside = crossed == [false; 5];
         let whole = asked.field.error(page).is_finite() && !asked.field.range(page).is_empty();
         let apart = |[low, high]: [f32; 2]| low.max(-high).max(0.0);
-        let away = apart(columns).hypot(apart(rows)).hypot(apart([slab.low, slab.high]));
+        let away = (square(apart(columns)) + square(apart(rows)) + square(apart([slab.low, slab.high]))).sqrt();
         let near = away < slab.high - slab.low;
-        Stage { slabs, slab, whole, inside, near, slack }
+        let mut down = [0.0; ACROSS * ACROSS + 1];
+        let all = slabs.as_flattened().iter().chain([&slab]);
+        down.iter_mut().zip(all).for_each(|(down, slab)| *down = lesser(lens.forward[2], slab.low, slab.high));
+        Stage { slabs, slab, down, whole, inside, crossed, near, slack }
     }
 }
 
@@ -118,6 +198,11 @@ const SLACK: f32 = 4e-6;
 #[inline(always)]
 fn lesser(normal: f32, low: f32, high: f32) -> f32 {
     normal * if normal > 0.0 { low } else { high }
+}
+
+#[inline(always)]
+fn square(x: f32) -> f32 {
+    x * x
 }
 
 /// The greater one.
@@ -146,14 +231,14 @@ pub(super) struct Lens {
 
 impl Lens {
     pub fn new(asked: &Asked, first: Cell, level: u8, cuts: bool) -> Lens {
-        let (origin, size) = match asked.field.datum() {
-            Datum::Plane { origin, size } => (origin, size),
-            Datum::Ellipsoid { .. } => (DVec2::ZERO, DVec2::ONE),
-        };
         let (forward, sides, focal, stretch) = asked.metric.lens();
-        let cell = size * first.side();
-        let at = (asked.metric.eye().truncate() - origin) / cell;
-        let whole = at.floor().clamp(DVec2::splat(-1e9), DVec2::splat(1e9));
+        let cell = asked.size * first.side();
+        let at = asked.eye * f64::from(1u32 << first.level);
+        let floor = |x: f64| {
+            let whole = x.clamp(-1e9, 1e9) as i32;
+            f64::from(whole - i32::from(f64::from(whole) > x))
+        };
+        let whole = DVec2::new(floor(at.x), floor(at.y));
         let rest = ((at - whole) * cell).as_vec2().to_array();
         let cells = [i64::from(first.x) - whole.x as i64, i64::from(first.y) - whole.y as i64].map(|cell| cell as i32);
         let size = cell.as_vec2().to_array();
@@ -180,6 +265,12 @@ impl Lens {
         [west - self.rest[0] - self.beyond[0], east - self.rest[0] + self.beyond[0]]
     }
 
+    /// The frame's planes, and how far (m) beyond them things are seen: the nearest counts like the sides.
+    fn planes(&self) -> [([f32; 3], f32); 5] {
+        let [a, b, c, d] = self.sides.map(|side| (side, 0.0));
+        [a, b, c, d, (self.forward, View::NEAR)]
+    }
+
     /// Southern and northern end of what counts for a row, from the eye (m).
     #[inline(always)]
     fn rows(&self, j: i32) -> [f32; 2] {
@@ -192,83 +283,20 @@ impl Lens {
 /// Cells that are measured together.
 const LANES: usize = 16;
 
-/// Judges cells by their errors (m) and how near they and half a cell about them are at most; those that cannot be cut,
-/// which have no finer ones beside them, by themselves and what coarser ones may add. Bounds are those of [`ScreenMetric`](super::super::ScreenMetric) for boxes as high
-/// as the blocks about them. Overwrites what is above.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
-pub(super) fn judge(lens: &Lens, stage: &Stage, rows: &mut Rows) -> Judged {
-    let side = 1usize << lens.level;
-    let lanes = side.max(LANES);
-    let (blocks, block) = if lens.level < BLOCKS { (1, side) } else { (ACROSS, side >> BLOCKS) };
-    let (mut ahead, mut far) = ([0.0f32; SIDE], [0.0f32; SIDE]);
-    for i in 0..lanes {
-        let [west, east] = lens.columns(i as i32);
-        ahead[i] = lesser(lens.forward[0], west, east) - stage.slack;
-        let most = if -west > east { -west } else { east };
-        far[i] = most * most;
-    }
-    let (seams, apart) = if lens.cuts { (SEAMS, 0.0) } else { (1.0, lens.tolerance / SEAMS) };
-    let (mut worst, mut most_above) = ([0.0f32; LANES], [0.0f32; LANES]);
-    rows.above[..side].fill(0);
-    for j in 0..blocks {
-        if rows.cells[j * block..(j + 1) * block].iter().all(|&bits| bits == 0) {
-            continue;
-        }
-        let mut depth = [0.0f32; SIDE];
-        for i in 0..blocks {
-            let slab = if blocks == 1 { stage.slab } else { stage.slabs[j][i] };
-            let part = i * block..(i + 1) * block;
-            depth[part].fill(lesser(lens.forward[2], slab.low, slab.high));
-        }
-        for i in 0..lanes {
-            depth[i] += ahead[i];
-        }
-        for y in j * block..(j + 1) * block {
-            let bits = rows.cells[y];
-            if bits == 0 {
-                continue;
-            }
-            let [south, north] = lens.rows(y as i32);
-            let ahead = lesser(lens.forward[1], south, north);
-            let most = if -south > north { -south } else { north };
-            let far_y = most * most;
-            let errors = &rows.errors[y];
-            let (from, to) = (bits.trailing_zeros() as usize / LANES, (63 - bits.leading_zeros() as usize) / LANES);
-            let mut above = 0u64;
-            for at in (from * LANES..=to * LANES).step_by(LANES) {
-                let (depth, far, errors) = (&depth[at..at + LANES], &far[at..at + LANES], &errors[at..at + LANES]);
-                let asked = ((bits & rows.whole[y] & rows.seen[y]) >> at) as u32;
-                let mut flags = [0u32; LANES];
-                for i in 0..LANES {
-                    let nearest = depth[i] + ahead;
-                    let depth = if nearest > View::NEAR { nearest } else { View::NEAR };
-                    let across = (far[i] + far_y).sqrt() + stage.slack;
-                    let widest = lens.stretch * depth;
-                    let within = if across < widest { across } else { widest };
-                    let scale = lens.focal * within / (depth * depth) * (1.0 + 1e-5);
-                    let bound = seams * errors[i] * scale + apart;
-                    let is_above = lens.cuts & (bound > lens.tolerance);
-                    flags[i] = u32::from(is_above) << i;
-                    let bound = if asked >> i & 1 == 1 { bound } else { 0.0 };
-                    let (below, beyond) = if is_above { (0.0, bound) } else { (bound, 0.0) };
-                    worst[i] = if below > worst[i] { below } else { worst[i] };
-                    most_above[i] = if beyond > most_above[i] { beyond } else { most_above[i] };
-                }
-                above |= u64::from(flags.iter().fold(0, |bits, flag| bits | flag)) << at;
-            }
-            rows.above[y] = above;
-        }
-    }
-    Judged { worst: worst.into_iter().fold(0.0, f32::max), most: most_above.into_iter().fold(0.0, f32::max) }
-}
-
 /// Says which cells near the eye may lie within the frame, of those of which `seen` says so, and, if asked to, judges them, each by its own heights and those of
 /// the cells beside it; `first` is the level's first cell.
-pub(super) fn look_near(asked: &Asked, lens: &Lens, first: Cell, judges: bool, rows: &mut Rows) -> Judged {
+pub(super) fn look_near(
+    asked: &Asked,
+    lens: &Lens,
+    stage: &Stage,
+    first: Cell,
+    judges: bool,
+    rows: &mut Rows,
+) -> Judged {
     let mut judged = Judged::default();
     let (seams, apart) = if lens.cuts { (SEAMS, 0.0) } else { (1.0, lens.tolerance / SEAMS) };
     let cells = 1i64 << first.level;
-    let beyond = Vec3::new(lens.beyond[0], lens.beyond[1], 0.0);
+    let eye = asked.metric.eye().z;
     for y in 0..1usize << lens.level {
         rows.above[y] = 0;
         let mut left = rows.cells[y] & rows.seen[y];
@@ -294,9 +322,12 @@ pub(super) fn look_near(asked: &Asked, lens: &Lens, first: Cell, judges: bool, r
             let beside = ranges.iter().flat_map(|row| &row[at..at + 3]);
             let all = beside.fold(HeightRange::EMPTY, |all, range| all.union(*range));
             let range = if lens.cuts { all } else { ranges[1][at + 1] };
-            let cell = Cell { x: first.x + x, y: first.y + y as u32, ..first };
-            let own = asked.metric.bounds(cell, range);
-            let bounds = Bounds { low: own.low - beyond, high: own.high + beyond };
+            let ([west, east], [south, north]) = (lens.columns(x as i32), lens.rows(y as i32));
+            let [low, high] = [range.low, range.high].map(|height| (f64::from(height) - eye) as f32);
+            let bounds = Bounds {
+                low: Vec3::new(west, south, low) - stage.slack,
+                high: Vec3::new(east, north, high) + stage.slack,
+            };
             if !asked.metric.sees(&bounds) {
                 rows.seen[y] &= !(1 << x);
                 continue;
@@ -304,7 +335,8 @@ pub(super) fn look_near(asked: &Asked, lens: &Lens, first: Cell, judges: bool, r
             if !judges || rows.whole[y] >> x & 1 == 0 {
                 continue;
             }
-            let bound = seams * asked.metric.pixels(&bounds, rows.errors[y][x as usize]) * (1.0 + 1e-5) + apart;
+            let bound =
+                seams * asked.metric.pixels(&bounds, rows.errors[rows.index(x as usize, y)]) * (1.0 + 1e-5) + apart;
             if lens.cuts && bound > lens.tolerance {
                 rows.above[y] |= 1 << x;
                 judged.most = judged.most.max(bound);
@@ -322,16 +354,17 @@ pub(super) fn see(lens: &Lens, stage: &Stage, rows: &mut Rows) {
     let side = 1usize << lens.level;
     let lanes = side.max(LANES);
     let (blocks, block) = if lens.level < BLOCKS { (1, side) } else { (ACROSS, side >> BLOCKS) };
-    // The nearest plane counts like the sides.
-    let [a, b, c, d] = lens.sides;
-    let planes = [a, b, c, d, lens.forward];
-    let least = [0.0, 0.0, 0.0, 0.0, View::NEAR].map(|least| least - stage.slack);
+    let beyond = lens.planes();
+    rows.seen[..side].fill(u64::MAX);
     for j in 0..blocks {
         if rows.cells[j * block..(j + 1) * block].iter().all(|&bits| bits == 0) {
             continue;
         }
-        let mut reach = [[0.0f32; SIDE]; 5];
-        for (plane, reach) in planes.iter().zip(&mut reach) {
+        for (k, (plane, least)) in beyond.into_iter().enumerate() {
+            if !stage.crossed[k] {
+                continue;
+            }
+            let mut reach = [0.0f32; SIDE];
             for i in 0..blocks {
                 let slab = if blocks == 1 { stage.slab } else { stage.slabs[j][i] };
                 reach[i * block..(i + 1) * block].fill(greater(plane[2], slab.low, slab.high));
@@ -340,31 +373,24 @@ pub(super) fn see(lens: &Lens, stage: &Stage, rows: &mut Rows) {
                 let [west, east] = lens.columns(i as i32);
                 *reach += greater(plane[0], west, east);
             }
-        }
-        for y in j * block..(j + 1) * block {
-            let bits = rows.cells[y];
-            if bits == 0 {
-                continue;
-            }
-            let [south, north] = lens.rows(y as i32);
-            let mut limits = [0.0f32; 5];
-            for (k, limit) in limits.iter_mut().enumerate() {
-                *limit = least[k] - greater(planes[k][1], south, north);
-            }
-            let (from, to) = (bits.trailing_zeros() as usize / LANES, (63 - bits.leading_zeros() as usize) / LANES);
-            let mut seen = 0u64;
-            for at in (from * LANES..=to * LANES).step_by(LANES) {
-                let mut flags = [0u32; LANES];
-                for i in 0..LANES {
-                    let mut sees = true;
-                    for k in 0..5 {
-                        sees &= reach[k][at + i] >= limits[k];
-                    }
-                    flags[i] = u32::from(sees) << i;
+            for y in j * block..(j + 1) * block {
+                let bits = rows.cells[y] & rows.seen[y];
+                if bits == 0 {
+                    continue;
                 }
-                seen |= u64::from(flags.iter().fold(0, |bits, flag| bits | flag)) << at;
+                let [south, north] = lens.rows(y as i32);
+                let limit = least - stage.slack - greater(plane[1], south, north);
+                let (from, to) = (bits.trailing_zeros() as usize / LANES, (63 - bits.leading_zeros() as usize) / LANES);
+                let mut seen = 0u64;
+                for at in (from * LANES..=to * LANES).step_by(LANES) {
+                    let mut flags = [0u32; LANES];
+                    for i in 0..LANES {
+                        flags[i] = u32::from(reach[at + i] >= limit) << i;
+                    }
+                    seen |= u64::from(flags.iter().fold(0, |bits, flag| bits | flag)) << at;
+                }
+                rows.seen[y] &= seen;
             }
-            rows.seen[y] = seen;
         }
     }
 }
