@@ -133,9 +133,9 @@ fn factors() -> impl Strategy<Value = Factors> {
     })
 }
 
-/// Four measured at once have the priorities that each has alone, to the bit.
+/// Four measured at once, and many, have the priorities that each has alone, to the bit.
 #[test]
-fn four_at_once_are_as_each_alone() {
+fn many_at_once_are_as_each_alone() {
     let at = |i: usize| ((i % 65) as f32, (i / 65) as f32);
     let heights: Vec<f32> = (0..65 * 65).map(at).map(|(x, y)| 9.0 * (0.3 * x).sin() + 7.0 * (0.2 * y).cos()).collect();
     let bounds = NestedBounds::of(&land(65, 65, &heights)).expect("few samples");
@@ -149,6 +149,15 @@ fn four_at_once_are_as_each_alone() {
         let mut level = vec![Diamond::ROOT];
         for _ in 0..11 {
             level = level.iter().flat_map(|diamond| diamond.children()).flatten().collect();
+            let items: Vec<Item> = level.iter().map(|&diamond| bounds.item(diamond, SPLIT, 9)).collect();
+            // Some may be merged, and some places are left.
+            let mut numbers: Vec<f32> = (0..items.len()).map(|i| [0.0, -0.0, 5.0, -3.0, f32::NAN][i % 5]).collect();
+            let before = numbers.clone();
+            super::super::scan::measure(&lens, &items, &[], &mut numbers);
+            for ((item, before), number) in items.iter().zip(before).zip(numbers) {
+                let alone = super::super::scan::renewed(lens.priority(item, None), before);
+                assert_eq!(number.to_bits(), alone.to_bits(), "{item:?}");
+            }
             for four in level.chunks_exact(4) {
                 let items = [0, 1, 2, 3].map(|i| bounds.item(four[i], SPLIT, i as u32));
                 let together = lens.priorities(&items).expect("neither voids nor factors");
