@@ -259,7 +259,7 @@ impl NestedBounds {
             let sides = Level::sides(level, Bound::EMPTY, &|i, j| of(&bounds, i, j));
             bounds.levels[usize::from(level)] = sides;
             let squares = Level::squares(level, Bound::EMPTY, &|i, j| of(&bounds, i, j));
-            bounds.levels[usize::from(level)].kinds[0] = squares;
+            bounds.levels[usize::from(level)].kinds[Kind::Square as usize] = squares;
         }
         Ok(bounds)
     }
@@ -355,7 +355,7 @@ impl NestedBounds {
             let sides = Level::sides(level, Slopes::EMPTY, &|i, j| of(&self, i, j));
             self.slopes[usize::from(level)] = sides;
             let squares = Level::squares(level, Slopes::EMPTY, &|i, j| of(&self, i, j));
-            self.slopes[usize::from(level)].kinds[0] = squares;
+            self.slopes[usize::from(level)].kinds[Kind::Square as usize] = squares;
         }
         self
     }

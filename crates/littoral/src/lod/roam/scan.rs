@@ -306,12 +306,18 @@ impl List {
 /// Measures many anew: numbers keep their signs, and what is none stays so.
 pub(super) fn measure(lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut [f32]) {
     match lens.priority {
-        Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
         #[cfg(target_arch = "x86_64")]
-        Priority::ScreenError if wide() => {
+        priority if wide() => {
             // SAFETY: the processor has just been asked.
-            unsafe { measure_errors_wide(lens, items, out) }
+            unsafe {
+                match priority {
+                    Priority::ScreenError if lens.voids => measure_wide::<true, true>(lens, items, out),
+                    Priority::ScreenError => measure_wide::<true, false>(lens, items, out),
+                    Priority::InverseDistance => measure_wide::<false, false>(lens, items, out),
+                }
+            }
         }
+        Priority::ScreenError if lens.voids => measure_errors_and_voids(lens, items, out),
         Priority::ScreenError => measure_errors(lens, items, out),
         Priority::InverseDistance => measure_distances(lens, items, out),
     }
@@ -322,24 +328,24 @@ pub(super) fn measure(lens: &Lens, items: &[Item], slopes: &[Slopes], out: &mut 
 
 const LANES: usize = 16;
 
-/// Whether the processor has what [`measure_errors_wide`] is compiled for.
+/// Whether the processor has what [`measure_wide`] is compiled for.
 #[cfg(target_arch = "x86_64")]
 fn wide() -> bool {
     use std::arch::is_x86_feature_detected as has;
     has!("avx512f") && has!("avx512dq") && has!("avx512vl") && has!("avx512bw") && has!("fma")
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn measure_errors(lens: &Lens, items: &[Item], out: &mut [f32]) {
     measure_one_by_one::<true, false>(lens, items, out);
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn measure_errors_and_voids(lens: &Lens, items: &[Item], out: &mut [f32]) {
     measure_one_by_one::<true, true>(lens, items, out);
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx512bw+fma+avx2", "x86_64+avx2+fma"))]
+#[multiversion(targets("x86_64+avx2+fma"))]
 fn measure_distances(lens: &Lens, items: &[Item], out: &mut [f32]) {
     measure_one_by_one::<false, false>(lens, items, out);
 }
@@ -389,21 +395,21 @@ fn measure_one_by_one<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items:
     }
 }
 
-/// The same where nothing is void, sixteen at a time: compilers gather each number of an item by itself, which takes longer than all that is computed from them.
+/// The same, sixteen at a time: compilers gather each number of an item by itself, which takes longer than all that is computed from them.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,fma,avx2")]
-fn measure_errors_wide(lens: &Lens, items: &[Item], out: &mut [f32]) {
+fn measure_wide<const ERRORS: bool, const VOIDS: bool>(lens: &Lens, items: &[Item], out: &mut [f32]) {
     let (sixteens, rest) = items.as_chunks::<LANES>();
     let (outs, last) = out.as_chunks_mut::<LANES>();
     for (items, out) in sixteens.iter().zip(outs) {
         let [at, heights, deviations, words] = turned(items);
         for lane in 0..LANES {
             let deviation = f32::from_bits(deviations[lane]);
-            let number = priority::<true, false>(lens, at[lane], heights[lane], deviation, words[lane]);
+            let number = priority::<ERRORS, VOIDS>(lens, at[lane], heights[lane], deviation, words[lane]);
             out[lane] = renewed(number, out[lane]);
         }
     }
-    measure_one_by_one::<true, false>(lens, rest, last);
+    measure_one_by_one::<ERRORS, VOIDS>(lens, rest, last);
 }
 
 /// The first numbers of sixteen items, the second, the third and the fourth.

@@ -1,5 +1,6 @@
 //! Against Algorithm I, from scratch and without any queue.
 
+use super::super::scan::{measure, renewed};
 use super::*;
 use crate::field::{Land, Raster, Sea};
 use crate::lod::{Disc, RoamOnce};
@@ -138,14 +139,17 @@ fn factors() -> impl Strategy<Value = Factors> {
 fn many_at_once_are_as_each_alone() {
     let at = |i: usize| ((i % 65) as f32, (i / 65) as f32);
     let heights: Vec<f32> = (0..65 * 65).map(at).map(|(x, y)| 9.0 * (0.3 * x).sin() + 7.0 * (0.2 * y).cos()).collect();
-    let bounds = NestedBounds::of(&land(65, 65, &heights)).expect("few samples");
+    let voids: Vec<f32> = (0..65 * 65).map(|i| if i % 97 == 0 { f32::NAN } else { heights[i] }).collect();
+    let [whole, holed] =
+        [heights, voids].map(|heights| NestedBounds::of(&land(65, 65, &heights)).expect("few samples"));
     let mut seen = 0;
-    for turn in 0..8 {
+    let kinds = [(&whole, Priority::ScreenError), (&holed, Priority::ScreenError), (&whole, Priority::InverseDistance)];
+    for (turn, (bounds, priority)) in (0..8).flat_map(|turn| kinds.map(|kind| (turn, kind))) {
         let yaw = f64::from(turn);
         let eye = DVec3::new(90.0, 60.0, 20.0 + 2.0 * yaw);
         let view = View::looking_at(eye, eye + DVec3::new(yaw.cos(), yaw.sin(), -0.3), 1.0, UVec2::new(640, 480));
         let metric = ScreenMetric::new(&view, bounds.datum()).expect("a view");
-        let lens = bounds.lens(&metric, Priority::ScreenError, &Factors::default());
+        let lens = bounds.lens(&metric, priority, &Factors::default());
         let mut level = vec![Diamond::ROOT];
         for _ in 0..11 {
             level = level.iter().flat_map(|diamond| diamond.children()).flatten().collect();
@@ -153,14 +157,14 @@ fn many_at_once_are_as_each_alone() {
             // Some may be merged, and some places are left.
             let mut numbers: Vec<f32> = (0..items.len()).map(|i| [0.0, -0.0, 5.0, -3.0, f32::NAN][i % 5]).collect();
             let before = numbers.clone();
-            super::super::scan::measure(&lens, &items, &[], &mut numbers);
+            measure(&lens, &items, &[], &mut numbers);
             for ((item, before), number) in items.iter().zip(before).zip(numbers) {
-                let alone = super::super::scan::renewed(lens.priority(item, None), before);
+                let alone = renewed(lens.priority(item, None), before);
                 assert_eq!(number.to_bits(), alone.to_bits(), "{item:?}");
             }
             for four in level.chunks_exact(4) {
                 let items = [0, 1, 2, 3].map(|i| bounds.item(four[i], SPLIT, i as u32));
-                let together = lens.priorities(&items).expect("neither voids nor factors");
+                let Some(together) = lens.priorities(&items) else { continue };
                 let alone = items.map(|item| lens.priority(&item, None));
                 assert_eq!(together.map(f32::to_bits), alone.map(f32::to_bits), "{four:?}");
                 seen += alone.iter().filter(|number| **number > 0.0).count();
